@@ -59,7 +59,7 @@ init a.py --template plant --tandem :: --tandem cannot be used with --template, 
 init folder.toml :: folder.toml: is a folder; must be the name of a file
 init a.toml --as hand=vendor.fmu :: --as hand: no component 'hand'; valid: plant, sens
 init a.toml --as plant=none.fmu :: none.fmu: no such FMU file
-init a.toml --fmu a=vendor.fmu --fmu a=vendor.fmu :: must be a name of its own
+init a.toml --fmu a=vendor.fmu --fmu a=vendor.fmu :: must be a new name of
 init a.toml --fmu a=vendor.fmu --as plant=vendor.fmu :: --as puts one into the grasp
 init a.toml --fingers 3 --as plant=vendor.fmu :: `grasp-cosim run a.toml --swap plant=vendor.fmu`
 init a.toml --fmu a=vendor.fmu --tandem :: each makes another system; must be one of them

@@ -158,7 +158,7 @@ def harmless_streams() -> Iterator[None]:
 
 
 def keep_output_for_us() -> None:
-    """The prints of the binary of an FMU go to standard error: with --json only the result is printed.
+    """Prints of the binary of an FMU go to standard error: --json prints only the result.
 
     In the place of a standard file that is closed comes one that cannot be written. Else the next
     file that is opened would get its number, and what an FMU prints.
