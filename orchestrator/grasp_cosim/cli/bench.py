@@ -178,9 +178,10 @@ def _of_one_way(option: str, entries: str | None, both: Conditions) -> Condition
     "--outage",
     "outages",
     multiple=True,
-    metavar="[requests:|answers:]FROM:[UNTIL]",
+    metavar="FROM:UNTIL",
     help="Drop all datagrams in a range of numbers of requests, or of times since the first one: "
-    "0.5s:2s.",
+    "0.5s:2s. Without UNTIL the outage does not end. A prefix requests: or answers: selects a "
+    "direction.",
 )
 @click.option(
     "--seed",

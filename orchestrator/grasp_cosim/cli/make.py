@@ -135,8 +135,9 @@ def build(
     "--limit",
     "limits",
     multiple=True,
-    metavar="VARIABLE=LOW:HIGH[:RATE]",
-    help="Permitted range of an input or output, and its greatest change per s.",
+    metavar="VARIABLE=LOW:HIGH:RATE",
+    help="Permitted range of an input or output, and its greatest change per s. :RATE may be "
+    "omitted.",
 )
 @target_option
 @click.option("--fmi", type=click.Choice(["2", "3"]), help="FMI version of the proxy. Default: 2.")
