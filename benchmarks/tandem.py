@@ -2,7 +2,7 @@
 
 Of each row COUNT grasps (100) are run natively in steps of 1 ms, drawn at random from seed 7:
 objects up to 50 mm off the wrist, 40 to 90 mm wide, both faces of colours from 0.3 to 1.2; printed
-is the worst of each figure. docs/how_to/tandem.md and docs/how_to/hardware.md have what came out.
+is the worst of each figure. docs/how_to/tandem.md has the results.
 """
 
 import math

@@ -2,7 +2,7 @@
  *
  * Here its inputs are those of a recorded run, with whose outputs it compares its own. On a board
  * put your converters into read_inputs() and write_outputs(), your clock into CLOCK, your memory
- * into cortex_m.ld. It speaks to the debugger (semihosting). Commands: docs/how_to/hardware.md.
+ * into cortex_m.ld. It speaks to the debugger (semihosting). Commands: docs/how_to/microcontroller.md.
  */
 #include <math.h>
 #include <stdint.h>

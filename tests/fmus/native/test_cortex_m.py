@@ -10,15 +10,18 @@ import pytest
 from grasp_cosim import cli
 from support.compiled import compile_c
 from support.direct import closed_loop
+from support.pages import BLOCKS, commands_of
 
 ROOT = Path(__file__).parents[3]
-PAGE = (ROOT / "docs/how_to/hardware.md").read_text("utf-8")
-SECTION = PAGE.partition("## The controller on a Cortex-M\n")[2].partition("\n## ")[0]
-COMMANDS = re.findall(r"^ {4}(.+)", SECTION, re.MULTILINE)
+PAGE = (ROOT / "docs/how_to/microcontroller.md").read_text("utf-8")
+CONSOLES = [block for kind, block in BLOCKS.findall(PAGE) if kind == "console"]
+SHOWN = [shown for block in CONSOLES for shown in commands_of(block)]
+COMMANDS = [command for command, _ in SHOWN]
 (COMPILE,) = (c for c in COMMANDS if c.startswith("arm-none-eabi-gcc"))
 LINKED = f"{COMPILE} -DWITH_LINK"
 """The same with a session of the link."""
-TABLE = [line.split(" | ") for line in re.findall(r"^\|(.*) \|$", SECTION, re.MULTILINE)]
+LOAD = PAGE.partition("## Measured load\n")[2].partition("\n## ")[0]
+TABLE = [line.split(" | ") for line in re.findall(r"^\|(.*) \|$", LOAD, re.MULTILINE)]
 ADAPTIVE = {
     "GraspController": "GraspControllerAdaptive",
     "grasp_controller": "grasp_controller_adaptive",
@@ -78,6 +81,9 @@ def test_the_figures_of_the_page(checkout, controller):
         assert not [name for name in symbols if re.search("alloc|sbrk|free", name)]
         bytes_of = dict(re.findall(r"^(\.\w+) +(\d+)", run(size), re.MULTILINE))
         image = said(run(replaced(emulated, other)))
+        if (controller, core) == ("published", "M4F"):
+            assert [*said(SHOWN[-1][1])] == [*image]
+            assert said(SHOWN[-1][1]) == pytest.approx(image, rel=0.1)
         assert image["steps"] == 3001
         assert image["steps begun late"] == 0
         difference = image["largest difference, 1e-18"] * 1e-18
@@ -85,7 +91,7 @@ def test_the_figures_of_the_page(checkout, controller):
         assert run(replaced(linked, other)) == ""
         image |= said(run(replaced(emulated, other)))
         assert image["bytes of its answer"] > 80 + 32
-        column = TABLE[0].index(f"{core}, {controller}")
+        column = TABLE[0].index(f"Cortex-{core}, {controller}")
         page = [float(row[column].replace(",", "")) for row in TABLE[1:]]
         found = [
             image["ticks of the clock a step"] * TICK,
