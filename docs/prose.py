@@ -341,17 +341,7 @@ EXEMPT = (":!tests", ":!CHANGELOG.md", ":!docs/prose.py")
 
 def tracked() -> list[Path]:
     """The pages and the modules that are in the repository, without the tests."""
-    command = [
-        "git",
-        "-C",
-        str(ROOT),
-        "ls-files",
-        "--",
-        "*.md",
-        "*.py",
-        ":!tests",
-        ":!docs/prose.py",
-    ]
+    command = ["git", "-C", str(ROOT), "ls-files", "--", "*.md", "*.py", *EXEMPT]
     listed = subprocess.run(command, capture_output=True, text=True, check=True)  # noqa: S603
     return [ROOT / name for name in listed.stdout.splitlines()]
 

@@ -2,7 +2,7 @@
 
 The function gets a Signals: names begin with a role or a component, and values are in SI base
 units. It returns a number, True or False, None where the moment never comes, or a list of these,
-one per finger for instance. An example: docs/guide.md.
+one per finger for instance. An example: docs/how_to/metric.md.
 """
 
 from __future__ import annotations
