@@ -32,6 +32,7 @@ from grasp_cosim.report.system_html import connections_svg, stand_alone
 from grasp_cosim.report.wording import Caption, about
 from grasp_cosim.system.settings import settings
 from hand import hand_svg, tandem_svg, three_svg
+from three_layers import three_layers_svg
 
 HERE = Path(__file__).parent
 
@@ -82,6 +83,11 @@ def draw_loop(folder: Path) -> None:
     system = grasp_system(native=False)
     units = simulate(system, stop=0.01).units
     write_text(folder / "loop.svg", f"{stand_alone(connections_svg(settings(system), units))}\n")
+
+
+def draw_three_layers(folder: Path) -> None:
+    """three_layers.svg: the diagram of docs/explanation/method.md."""
+    write_text(folder / "three_layers.svg", three_layers_svg())
 
 
 def draw_report(folder: Path) -> None:
@@ -172,16 +178,19 @@ PICTURES: Mapping[str, tuple[Callable[[Path], None], Sequence[str]]] = {
     "three": (draw_three, ["three_fingers.svg", "three_fingers.png"]),
     "tandem": (draw_tandem, ["tandem.svg"]),
     "loop": (draw_loop, ["loop.svg"]),
+    "three_layers": (draw_three_layers, ["three_layers.svg"]),
     "evaluation": (draw_evaluation, ["contact_times.png", "contact_forces.png"]),
     "report": (draw_report, ["report.png"]),
     "timing": (draw_timing, ["timing.png"]),
     "sweep": (draw_sweep_of_widths, ["sweep.png"]),
     "maps": (draw_map, ["reflectance_map.png"]),
     "layer_2": (draw_layer_2, ["layer_2_loop.png"]),
-    "limits": (
-        partial(tutorials.update, "explanation/limits"),
-        ["layers.png", "objects.png", "limits.png", "colour.png"],
+    "method": (partial(tutorials.update, "explanation/method"), ["layers.png", "objects.png"]),
+    "adaptive_law": (
+        partial(tutorials.update, "explanation/adaptive_law"),
+        ["unequal_faces.png", "colour.png"],
     ),
+    "limits": (partial(tutorials.update, "explanation/limits"), ["limits.png"]),
     "your_plant": (partial(tutorials.update, "how_to/python_block"), ["your_plant.png"]),
 }
 """What draws into a folder, and the files there."""

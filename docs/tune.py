@@ -1,4 +1,4 @@
-"""Gains that grasp faster, by SciPy's differential evolution: docs/explanation/limits.md.
+"""Gains that grasp faster, by SciPy's differential evolution: docs/how_to/friction_and_gains.md.
 
     .venv/bin/python docs/tune.py [GENERATIONS]
 

@@ -190,23 +190,23 @@ def learnt(run: Result) -> float | None:
 
 COLUMNS: Mapping[str, tuple[str | Callable[[Result], float | list[float] | None], float, int]] = {
     "contacts, s": ("time_to_contact", 1.0, 3),
-    "apart, s": ("time_difference", 1.0, 3),
+    "time difference, s": ("time_difference", 1.0, 3),
     "impacts, mm/s": ("impact_velocity", 1e3, 1),
     "peak forces, N": ("peak_contact_force", 1.0, 2),
-    "ratio learnt": (learnt, 1.0, 3),
+    "learnt ratio": (learnt, 1.0, 3),
     "steady forces, N": ("steady_contact_force", 1.0, 2),
-    "target at the end, mm": ("target_position", 1e3, 1),
-    "object shifted, mm": ("object_shift", 1e3, 2),
+    "target position, mm": ("target_position", 1e3, 1),
+    "object shift, mm": ("object_shift", 1e3, 2),
     "tilt, °": ("object_tilt", math.degrees(1.0), 2),
     "toppled": ("toppled", 1.0, 0),
     "squeeze, mm": ("squeeze", 1e3, 2),
     "damaged": ("damaged", 1.0, 0),
-    "gap of the other then, mm": (gap_behind, 1e3, 2),
-    "drift at the end, mm/s": (drift, 1e3, 1),
-    "gap left, mm": (lambda run: abs(run.signals["plant.gap[1]"][-1]), 1e3, 1),
+    "gap of the second finger, mm": (gap_behind, 1e3, 2),
+    "object drift, mm/s": (drift, 1e3, 1),
+    "remaining gap, mm": (lambda run: abs(run.signals["plant.gap[1]"][-1]), 1e3, 1),
     "Eq. (9), mm": (gap_by_equation_9, 1e3, 2),
     "formula, mm/s": (drift_by_equation_3, 1e3, 1),
-    "blind below, mm": (blind_by_equation_9, 1e3, 1),
+    "blind range, mm": (blind_by_equation_9, 1e3, 1),
     "formula, mm": (gap_by_equation_7, 1e3, 1),
 }
 """What the headings of the tables mean: a metric or a function of a run, its factor, the digits."""
@@ -229,14 +229,24 @@ def _picture(
     save_figure(figure, path)
 
 
-def draw_limits(tables: Sequence[Runs], folder: Path) -> None:
-    """All pictures of limits.md."""
-    cases, box, tall, cup, reflectances, carried, laws, _, converter, _, friction, *_ = tables
+def draw_method(tables: Sequence[Runs], folder: Path) -> None:
+    """All pictures of method.md."""
+    cases, box, tall, cup = tables
     draw_layers(cases, folder / "layers.png")
     draw_objects(_plain(box), _plain(tall), _plain(cup), folder / "objects.png")
-    each = (reflectances, carried, converter, friction)
-    draw_failures([_plain(runs) for runs in each], folder / "limits.png")
-    draw_colour(_plain(laws), folder / "colour.png")
+
+
+def draw_adaptive_law(tables: Sequence[Runs], folder: Path) -> None:
+    """All pictures of adaptive_law.md."""
+    reflectances, carried, laws = (_plain(runs) for runs in tables)
+    draw_unequal_faces(reflectances, carried, folder / "unequal_faces.png")
+    draw_colour(laws, folder / "colour.png")
+
+
+def draw_limits(tables: Sequence[Runs], folder: Path) -> None:
+    """The picture of limits.md."""
+    _, converter, _, friction, *_ = tables
+    draw_failures(_plain(converter), _plain(friction), folder / "limits.png")
 
 
 def _plain(runs: Runs) -> Runs:
@@ -301,21 +311,26 @@ def _over_time(
     finish_axes(axes, y, legend)
 
 
-def draw_failures(tables: Sequence[Runs], path: Path) -> None:
-    """Unequal reflectances, fixed and free; a converter too small; friction."""
-    reflectances, carried, converter, friction = tables
-    with _picture(path, "Where the method fails", 9.0, 7.0, 2, 2) as ((fixed, free), (near, held)):
+def draw_unequal_faces(reflectances: Runs, carried: Runs, path: Path) -> None:
+    """The published law before unequal reflectances, the object fixed and free."""
+    title = "Unequal faces and the published law"
+    with _picture(path, title, 9.0, 3.6, 1, 2) as ((fixed, free),):
         ratios = [float(ratio) for ratio in reflectances]
         fixed.plot(ratios, [1e3 * gap_behind(r) for r in reflectances.values()], "o", color=BLUE)
         curve = np.geomspace(0.5, 2.0, 101)
         fixed.plot(curve, [1e3 * gap_at_equal_intensity(r) for r in curve], color=GREY)
-        fixed.set_title("unequal reflectances, fixed object", fontsize=10)
+        fixed.set_title("fixed object", fontsize=10)
         fixed.set_xlabel("reflectance of the right face / left face")
         finish_axes(fixed, "gap of the second finger\nat the first contact in mm", legend=False)
         fixed.legend(["simulated", "Eq. (9), equal intensities"], fontsize=8)
-        free.set_title("reflectances 0.86 / 1, free object", fontsize=10)
+        free.set_title("free object, reflectances 0.86 / 1", fontsize=10)
         y = "position of the object in mm"
         _over_time(free, carried, "plant.object_position", 1e3, "{} kg", y, legend=True)
+
+
+def draw_failures(converter: Runs, friction: Runs, path: Path) -> None:
+    """A converter whose range is too small, and friction."""
+    with _picture(path, "Where the method fails", 9.0, 3.6, 1, 2) as ((near, held),):
         for style, (volts, run) in zip(LINE_STYLES, converter.items(), strict=False):
             speed = 1e3 * CLOSING[1] * run.signals["plant.velocity[1]"]
             before = ~run.signals["plant.contact[1]"].astype(bool) & (speed > 0.0)
@@ -363,6 +378,8 @@ def draw_your_plant(tables: Sequence[Runs], folder: Path) -> None:
 
 
 PAGES: Mapping[str, Callable[[Sequence[Runs], Path], None]] = {
+    "explanation/method": draw_method,
+    "explanation/adaptive_law": draw_adaptive_law,
     "explanation/limits": draw_limits,
     "how_to/python_block": draw_your_plant,
 }

@@ -1,4 +1,4 @@
-"""The tables and pictures of limits.md and python_block.md are what their commands give."""
+"""Tables and pictures of the explanations and of python_block.md are those of their commands."""
 
 import importlib.util
 import re
@@ -39,7 +39,7 @@ def checked(name, checkout):
         assert found == text, "run: docs/pictures.py"
         tutorials.PAGES[name](tables, drawn)
     pictures = sorted(p.name for p in drawn.iterdir())
-    assert sorted({Path(p).name for p in re.findall(r"!\[.*?\]\((.*?)\)", text)}) == pictures
+    assert sorted({Path(p).name for p in re.findall(r"!\[.*?\]\((.*?png)\)", text)}) == pictures
     for picture in pictures:
         assert_same_picture(drawn / picture, DOCS / picture, "docs/pictures.py")
     return tables
@@ -47,7 +47,8 @@ def checked(name, checkout):
 
 @pytest.mark.slow
 def test_the_commands_at_the_beginnings_work(checkout):
-    commands = INDENTED.findall(page("explanation/limits") + page("how_to/python_block"))
+    pages = ("explanation/method", "explanation/limits", "how_to/python_block")
+    commands = INDENTED.findall("\n".join(map(page, pages)))
     assert {command.split()[1] for command in commands} == {"init", "build", "run"}
     for command in commands:
         short = ["--stop", "0.01"] if command.split()[1] == "run" else []
@@ -57,21 +58,36 @@ def test_the_commands_at_the_beginnings_work(checkout):
 
 @pytest.mark.slow
 @pytest.mark.campaign
-def test_limits(checkout):
-    """And what a few of its formulas give, worked out here once more."""
-    assert cli.main(["build", "docs/moving_object.py"]) == 0
-    cases, _, _, cup, colours, _, laws, _, converter, _, friction, *_ = checked(
-        "explanation/limits", checkout
-    )
+def test_method(checkout):
+    """And what layer 1 gives, worked out here once more."""
+    cases, _, _, cup = checked("explanation/method", checkout)
     force = 98.0 * 0.035  # layer 1's spring over half the width
     steady = cases["--case 0"].metrics["steady_contact_force"]
     assert steady == pytest.approx([force, force], abs=1e-6)
     squeeze = 2.0 * force / (98.0 + 1000.0)  # each side's spring against it
     assert cup["0"].signals["plant.squeeze"][-1] == pytest.approx(squeeze, rel=1e-3)
+    assert f"with {np.mean(cases['--case 2'].metrics['steady_contact_force']):.2f} N." in page(
+        "explanation/method"
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.campaign
+def test_adaptive_law(checkout):
+    """And which ratios of reflectance the published law bears."""
+    colours, _, laws = checked("explanation/adaptive_law", checkout)
     together = [ratio for ratio, run in colours.items() if run.metrics["time_difference"] < 0.1]
     assert together == [*colours][2:5] + [*colours][7:]
     learnt = laws["adaptive"].signals["controller.reflectance_ratio"][-1]
     assert learnt == pytest.approx(0.57, rel=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.campaign
+def test_limits(checkout):
+    """And what two of its formulas give, worked out here once more."""
+    assert cli.main(["build", "docs/moving_object.py"]) == 0
+    _, converter, _, friction, *_ = checked("explanation/limits", checkout)
     signals = converter["0.9"].signals
     free = ~signals["plant.contact[1]"].astype(bool) & (signals["plant.gap[1]"] < 0.02)
     slowest = np.argmax(np.where(free, signals["plant.velocity[1]"], -np.inf))
