@@ -1,4 +1,4 @@
-"""What the page says of commands: which run the code of an FMU, and which only read it."""
+"""The table of docs/how_to/untrusted_fmu.md: commands that run code of an FMU, and that read it."""
 
 import os
 import zipfile
@@ -52,7 +52,7 @@ def loaded(folder, *arguments):
 
 @needs_gcc
 def test_what_only_reads(folder):
-    assert "| `inspect`, `init`, `ssp`, `proxy`, `report` |" in PAGE
+    assert "| `inspect`, `init`, `ssp`, `proxy`, `report` | reads it" in PAGE
     assert loaded(folder, "run", "system.toml", "--out", "results") == {os.getpid()}
     assert not loaded(folder, "inspect", "a.fmu")
     assert not loaded(folder, "init", "alone.toml", "--fmu", "a=a.fmu")
