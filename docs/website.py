@@ -9,10 +9,10 @@ commands and Python functions: MkDocs 1 with Material is no longer developed, an
 follows it, has no pages of click yet. Each warning of Sphinx is an error.
 """
 
-import io
 import os
 import re
 import shutil
+import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -23,8 +23,6 @@ from typing import Any, NamedTuple
 
 import grasp_cosim
 from grasp_cosim.cli.group import MODULE_OF_COMMAND
-from sphinx.application import Sphinx
-from sphinx.errors import SphinxError
 
 ROOT = Path(__file__).parents[1]
 MAP = Path("docs/README.md")
@@ -245,31 +243,26 @@ def settings() -> Mapping[str, Any]:
     }
 
 
+def configuration() -> str:
+    """The text of conf.py, which Sphinx reads."""
+    folder = str(Path(__file__).parent)
+    lines = ["import sys", f"sys.path.insert(0, {folder!r})"]
+    lines += [f"{name} = {value!r}" for name, value in settings().items()]
+    return "\n".join(lines) + "\n"
+
+
 def main(site: Path) -> None:
     """Write the site; SystemExit with the warnings of Sphinx if there are any."""
-    warnings = io.StringIO()
-    sys.path.insert(0, str(Path(__file__).parent))
     with TemporaryDirectory(prefix="grasp_site_") as name:
         source = Path(name, "pages")
         source.mkdir()
         copy(source)
-        try:
-            app = Sphinx(
-                source,
-                confdir=None,
-                outdir=site.resolve(),
-                doctreedir=Path(name, "doctrees"),
-                buildername="html",
-                confoverrides=dict(settings()),
-                status=None,
-                warning=warnings,
-                freshenv=True,
-            )
-            app.build()
-        except SphinxError as error:
-            raise SystemExit(f"{warnings.getvalue()}{error}") from error
-    if text := warnings.getvalue():
-        raise SystemExit(text)
+        (source / "conf.py").write_text(configuration(), "utf-8")
+        command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html"]
+        command += ["-d", str(Path(name, "doctrees")), str(source), str(site.resolve())]
+        done = subprocess.run(command, capture_output=True, text=True)  # noqa: S603
+        if done.returncode:
+            raise SystemExit(done.stderr)
     for page in ROOT.glob("docs/*.html"):
         shutil.copyfile(page, site / "docs" / page.name)
     print(site / "index.html")

@@ -115,7 +115,9 @@ def link_words(app: Sphinx, document: nodes.document, name: str) -> None:
             linked.add(words[word])
             parts.append(nodes.Text(text[end : match.start()]))
             uri = f"{address}#{words[word]}"
-            parts.append(nodes.reference(match[0], match[0], refuri=uri, classes=["word"]))
+            parts.append(
+                nodes.reference(match[0], match[0], refuri=uri, internal=True, classes=["word"])
+            )
             end = match.end()
         if parts and text.parent is not None:
             text.parent.replace(text, [*parts, nodes.Text(text[end:])])

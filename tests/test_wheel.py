@@ -87,7 +87,7 @@ def test_the_page_on_a_plant_of_ones_own_runs_as_it_is_written(python, tmp_path)
     def command(line, code=0):
         return python("-m", "grasp_cosim", *shlex.split(line)[1:], cwd=tmp_path, code=code)
 
-    (folder,) = re.findall("Pages, examples and a notebook: (.*)", command("grasp-cosim --help"))
+    (folder,) = re.findall("Documentation: (.*)", command("grasp-cosim --help"))
     pages = [Path(folder) / f"how_to/{name}.md" for name in ("python_block", "foreign_fmu")]
     page = "".join(path.read_text("utf-8") for path in pages)
     assert "/env/lib/" in folder

@@ -72,10 +72,10 @@ def _component(component: Component) -> dict[str, Any]:
 
 
 def _value_units(component: Component) -> dict[str, str]:
-    """The units of the start values of a component, of those that have one."""
+    """The units of the start values of a component, but for mere numbers, of unit 1."""
     variables = component.interface.by_name
     units = {name: variables[name].unit for name in component.values if name in variables}
-    return {name: unit for name, unit in units.items() if unit}
+    return {name: unit for name, unit in units.items() if unit not in (None, "", "1")}
 
 
 def _solver(component: Component) -> dict[str, Any]:
