@@ -74,6 +74,7 @@ check: .venv/dev
 	$(BIN)/mypy --platform win32
 	$(BIN)/mypy --platform darwin
 	$(BIN)/python -m pytest -q tests/test_import_rules.py
+	$(BIN)/python docs/prose.py
 
 docs: .venv/dev
 	$(BIN)/python docs/website.py
