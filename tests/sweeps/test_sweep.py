@@ -232,7 +232,7 @@ def test_ctrl_c_keeps_what_is_done(tmp_path, whom):
     write_integrator(tmp_path)
     code, out, err = sweeping(tmp_path, 5, f"os.kill({whom}, signal.SIGINT)")
     assert (code, out) == (130, "")
-    said = "finished runs are kept beside sweep.csv, the same command goes on"
+    said = "finished runs are kept next to sweep.csv; the same command continues"
     line = f"grasp-cosim: interrupted; {said}"
     assert len(kept(tmp_path)) >= 6
     assert any(one.endswith(line) for one in err.splitlines())  # behind what an FMU had begun
