@@ -172,7 +172,15 @@ def test_each_word_is_in_the_glossary_once():
     missing = {
         *("peer", "host", "master", "communication step", "lockstep", "session", "watchdog"),
         *("failsafe", "overrun", "isolation", "engine", "swap", "tunable", "feedthrough"),
-        *("model exchange", "weight", "target position", "platform", "key", "test bench", "hold a value"),
+        *(
+            "model exchange",
+            "weight",
+            "target position",
+            "platform",
+            "key",
+            "test bench",
+            "hold a value",
+        ),
         *("O-RLI", "case", "layer", "proxy", "Jacobi", "SSP", "sequential", "role", "preset"),
         *("native twin", "contact", "stop time"),
     } - {*words}
