@@ -28,6 +28,9 @@ ROOT = Path(__file__).parents[1]
 MAP = Path("docs/README.md")
 """The page that lists all others."""
 
+ORCHESTRATOR = Path("orchestrator/README.md")
+"""The page that has those of the packages below it."""
+
 LINK = re.compile(r"\]\(([^)#\s:]+)(#[^)\s]*)?\)")
 FENCED = re.compile(r"^(```|~~~).*?^\1", re.DOTALL | re.MULTILINE)
 
@@ -77,16 +80,15 @@ def from_top(page: Path, link: str) -> Path:
 def pages() -> list[Path]:
     """All pages: the README, the map, those of the groups and those below them."""
     listed = [Path("README.md"), MAP, *(page for group in groups() for page in group.pages)]
-    return [*listed, *(page for packages in below().values() for page in packages)]
+    return [*listed, *pages_of_packages()]
 
 
-def below() -> dict[Path, list[Path]]:
-    """The pages of the packages, below the page of the orchestrator."""
-    top = Path("orchestrator/README.md")
-    links = [from_top(top, link) for link, _ in LINK.findall((ROOT / top).read_text("utf-8"))]
-    return {
-        top: sorted({p for p in links if p.name == "README.md" and p.is_relative_to(top.parent)})
-    }
+def pages_of_packages() -> list[Path]:
+    """The pages of the packages, which the page of the orchestrator links to."""
+    text = (ROOT / ORCHESTRATOR).read_text("utf-8")
+    links = {from_top(ORCHESTRATOR, link) for link, _ in LINK.findall(text)}
+    folder = ORCHESTRATOR.parent
+    return sorted(p for p in links if p.name == "README.md" and p.is_relative_to(folder))
 
 
 def copy(folder: Path) -> None:
@@ -140,8 +142,10 @@ def contents(page: Path) -> str:
                 names += [f"{COMMANDS}/index", f"{PYTHON}/index"]
             trees.append(tree(group.title, names))
         return "".join(trees)
-    names = [os.path.relpath(path.with_suffix(""), page.parent) for path in below().get(page, [])]
-    return tree("", names) if names else ""
+    if page == ORCHESTRATOR:
+        paths = [path.with_suffix("") for path in pages_of_packages()]
+        return tree("", [os.path.relpath(path, page.parent) for path in paths])
+    return ""
 
 
 def tree(title: str, names: list[str]) -> str:
@@ -236,10 +240,8 @@ def settings() -> Mapping[str, Any]:
         "html_theme_options": {"source_repository": repository} if repository else {},
         "html_static_path": [str(ROOT / "docs/website.css")],
         "html_css_files": ["website.css"],
-        "html_extra_path": [],
         "html_copy_source": False,
         "pygments_style": "friendly",
-        "exclude_patterns": ["**/.ipynb_checkpoints"],
     }
 
 

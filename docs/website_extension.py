@@ -2,9 +2,9 @@
 
 import re
 from collections.abc import Iterator
-from importlib.util import find_spec
-from pathlib import Path
-from typing import Any
+from functools import cache
+from importlib.resources import files
+from typing import Any, NamedTuple
 
 import click
 from docutils import nodes
@@ -58,10 +58,9 @@ def show_examples(_: Sphinx, __: click.Context, lines: list[str]) -> None:
 
 def copy_font(app: Sphinx, error: Exception | None) -> None:
     """Put STIX Two Math into the site; the package ziamath has it."""
-    package = find_spec("ziamath")
-    if error is None and package is not None and package.origin is not None:
-        font = Path(package.origin).parent / "fonts/STIXTwoMath-Regular.ttf"
-        copy_asset(font, app.outdir / "_static")
+    if error is None:
+        font = files("ziamath") / "fonts/STIXTwoMath-Regular.ttf"
+        copy_asset(str(font), app.outdir / "_static")
 
 
 # Links to the glossary
@@ -90,37 +89,52 @@ def words_of(glossary: nodes.document) -> dict[str, str]:
     return anchors
 
 
+class Vocabulary(NamedTuple):
+    """The words of the glossary: their pattern, and the anchors of their rows in lower case."""
+
+    pattern: re.Pattern[str]
+    anchors: dict[str, str]
+
+
+@cache
+def vocabulary(app: Sphinx) -> Vocabulary:
+    """The words of the glossary of a site; the longest of several words is found first."""
+    anchors = words_of(app.env.get_doctree(GLOSSARY))
+    words = "|".join(map(re.escape, sorted(anchors, key=len, reverse=True)))
+    pattern = re.compile(rf"(?<![\w-])({words})(?=s?(?![\w-]))", re.I)
+    return Vocabulary(pattern, {word.lower(): anchor for word, anchor in anchors.items()})
+
+
 def link_words(app: Sphinx, document: nodes.document, name: str) -> None:
     """Make the first use of each word of the glossary on a page a link to it."""
-    words = words_of(app.env.get_doctree(GLOSSARY))
     if name == GLOSSARY:
         words_of(document)
+    if name == GLOSSARY or not name.startswith("docs/") or GENERATED.match(name):
         return
-    if not name.startswith("docs/") or GENERATED.match(name) or not words:
-        return
-    longest_first = sorted(words, key=len, reverse=True)
-    pattern = re.compile(
-        rf"(?<![\w-])({'|'.join(map(re.escape, longest_first))})(?=s?(?![\w-]))", re.I
-    )
-    known = {word.lower(): word for word in words}
     address = app.builder.get_relative_uri(name, GLOSSARY)
     linked: set[str] = set()
     for text in list(texts(document)):
-        parts: list[nodes.Node] = []
-        end = 0
-        for match in pattern.finditer(text):
-            word = known[match[0].lower()]
-            if words[word] in linked:
-                continue
-            linked.add(words[word])
-            parts.append(nodes.Text(text[end : match.start()]))
-            uri = f"{address}#{words[word]}"
-            parts.append(
-                nodes.reference(match[0], match[0], refuri=uri, internal=True, classes=["word"])
-            )
-            end = match.end()
-        if parts and text.parent is not None:
-            text.parent.replace(text, [*parts, nodes.Text(text[end:])])
+        parts = linked_parts(text, vocabulary(app), address, linked)
+        if len(parts) > 1 and text.parent is not None:
+            text.parent.replace(text, parts)
+
+
+def linked_parts(
+    text: nodes.Text, words: Vocabulary, address: str, linked: set[str]
+) -> list[nodes.Node]:
+    """The parts of a text, of which words that are not yet linked are links; adds their anchors."""
+    parts: list[nodes.Node] = []
+    end = 0
+    for match in words.pattern.finditer(text):
+        anchor = words.anchors[match[0].lower()]
+        if anchor in linked:
+            continue
+        linked.add(anchor)
+        uri = f"{address}#{anchor}"
+        link = nodes.reference(match[0], match[0], refuri=uri, internal=True, classes=["word"])
+        parts += [nodes.Text(text[end : match.start()]), link]
+        end = match.end()
+    return [*parts, nodes.Text(text[end:])]
 
 
 def texts(document: nodes.document) -> Iterator[nodes.Text]:

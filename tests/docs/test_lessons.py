@@ -22,6 +22,6 @@ LESSONS = [
 @pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("page", LESSONS)
-def test_a_page_does_what_it_shows(page, checkout, monkeypatch, capsys):
+def test_a_page_does_what_it_shows(page, checkout, capsys):
     pytest.importorskip("matplotlib")
-    do((ROOT / page).read_text("utf-8"), monkeypatch, capsys)
+    do((ROOT / page).read_text("utf-8"), capsys)

@@ -6,7 +6,6 @@ file, or appended to it. Other Python blocks run one after the other with the sa
 block that follows one is its output.
 """
 
-import os
 import re
 import shlex
 import subprocess
@@ -15,6 +14,10 @@ from io import StringIO
 from pathlib import Path
 
 from grasp_cosim import cli
+from support.pages import commands_of
+
+NEGATIVE = re.compile(r"^(DIFFERENT|NOT QUALIFIED|FAILS) ?", re.MULTILINE)
+"""The lines of outputs that go with exit code 1."""
 
 BLOCK = re.compile(r"^```(console|python|toml|text)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 FILE_NAME = re.compile(r"# ([\w/]+\.(?:py|toml|csv))\b")
@@ -27,14 +30,16 @@ CHANGING = [
 """Parts of outputs that differ from run to run."""
 
 
-def do(page, monkeypatch, capsys):
+def do(page, capsys):
     """Do all that a page shows, in the current folder, which is like that of a checkout."""
     names = {"__name__": "__main__"}
     printed = ""
     for kind, block in BLOCK.findall(page):
         if kind == "console":
-            for command, shown in commands(block):
-                assert_shown(shown, output_of(command, monkeypatch, capsys), command)
+            for line, shown in commands_of(block):
+                command = line.partition("  #")[0].strip()
+                code = 1 if NEGATIVE.search(shown) else 0
+                assert_shown(shown, output_of(command, code, capsys), command)
         elif kind == "text":
             assert_shown(block, printed, "the Python block above")
         elif name := APPENDED.match(block):
@@ -48,31 +53,19 @@ def do(page, monkeypatch, capsys):
             printed = out.getvalue()
 
 
-def commands(block):
-    """The commands of a console block, each with what is shown below it."""
-    whole = block.replace("\\\n", " ")
-    for part in re.findall(r"^\$ (.*?)(?=^\$ |\Z)", whole, re.MULTILINE | re.DOTALL):
-        command, _, shown = part.partition("\n")
-        yield command.partition("  #")[0].strip(), shown
-
-
-def output_of(command, monkeypatch, capsys):
-    """What a command prints on both streams; its exit code is 0 unless the page shows why not."""
+def output_of(command, code, capsys):
+    """What a command prints on both streams; it must end with the exit code."""
     words = shlex.split(command)
-    if words[0] == "python":
-        done = subprocess.run(
-            ["python", *words[1:]], capture_output=True, text=True, env=os.environ, check=False
-        )
-        return done.stdout + done.stderr
     if words == ["source", ".venv/bin/activate"]:
         return ""  # the tests run in an environment
-    if words[0] != "grasp-cosim":
-        done = subprocess.run(command, shell=True, capture_output=True, text=True, check=True)
-        return done.stdout
-    capsys.readouterr()
-    cli.main(words[1:])
-    streams = capsys.readouterr()
-    return streams.out + streams.err
+    if words[0] == "grasp-cosim":
+        capsys.readouterr()
+        assert cli.main(words[1:]) == code, command
+        streams = capsys.readouterr()
+        return streams.out + streams.err
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
+    assert done.returncode == code, done.stderr
+    return done.stdout + done.stderr
 
 
 def assert_shown(shown, printed, command):

@@ -173,7 +173,7 @@ def extra_module(name: str, purpose: str, extra: str) -> Any:
 
 
 def packages(extra: str) -> list[str]:
-    """Return what our extra needs, like "matplotlib>=3.9".
+    """Return the requirement of one of our extras, like "matplotlib>=3.9".
 
     A package index may not have us, nor a folder that a command is given in: these are named.
     """

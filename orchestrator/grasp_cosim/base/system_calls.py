@@ -1,7 +1,7 @@
 """What only some operating systems have, with what the others get in its place.
 
 No other module asks for it. On Windows there is no priority, no pinning, no locked memory, and no
-group of processes: what our process has started lives on. macOS lacks the first three.
+group of processes: the children of a process of ours live on. macOS lacks the first three.
 """
 
 import ctypes

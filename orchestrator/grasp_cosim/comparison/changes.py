@@ -156,11 +156,11 @@ def _metric_changes(before: Result, after: Result) -> Iterator[MetricChange]:
                 f"{metric.name}: is in {units[0]!r} before and in {units[1]!r} after; must be one "
                 "unit: measure both runs with the same metrics"
             )
-        one, other = _values(first, metric.name), _values(second, metric.name)
-        count = max(len(one), len(other))
+        columns_of_runs = [_values(values, metric.name) for values in (first, second)]
+        count = max(map(len, columns_of_runs))
         for i in range(count):
             name = metric.name if count == 1 else f"{metric.name}[{i + 1}]"
-            pair = [values[i] if i < len(values) else None for values in (one, other)]
+            pair = [values[i] if i < len(values) else None for values in columns_of_runs]
             yield MetricChange(name, units[0], *pair)
 
 

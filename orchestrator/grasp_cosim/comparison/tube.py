@@ -1,6 +1,6 @@
 """How far two curves are apart where a shift in time is allowed: a tube around each.
 
-Why so: docs/how_to/sweep.md.
+Why so: docs/explanation/tolerance_bands.md.
 """
 
 from typing import NamedTuple

@@ -16,7 +16,7 @@ NUMBERS = np.dtype("<f8")
 
 
 def state_numbers(slave: Any, interface: Interface) -> npt.NDArray[np.float64]:
-    """Those of the state that our FMU is in, of which FMPy has the instance."""
+    """Those of the state of an FMU that was made here, of which FMPy has the instance."""
     begin = _first(interface)
     return np.frombuffer(_content(slave), NUMBERS, offset=begin).astype(np.float64)
 

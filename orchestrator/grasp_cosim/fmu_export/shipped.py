@@ -175,9 +175,7 @@ def package_folder(package: str) -> Path:
 
 
 def sheet_file(package: str) -> Path:
-    """Return the equation sheet of a package: in it once it is installed, in the sources next to
-    it.
-    """
+    """Return the equation sheet of a package, in the package or next to it in the sources."""
     inside = package_folder(package) / "README.md"
     return inside if inside.exists() else inside.parents[1] / "README.md"
 

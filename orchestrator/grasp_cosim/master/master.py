@@ -3,7 +3,7 @@
 Stepping is here; a run by the clock is in paced.py, the start in start.py, the end in end.py; a
 step that an FMU rejects or has events in is in step_completion.py.
 
-The schemes, components with a longer step and time are in docs/reference/system_file.md.
+The schemes, components with a longer step and time: docs/explanation/co_simulation.md.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Groups: what is worked out, checked and shown of one kind of system, under the name it has.
 
 A system file asks for them by name, `metrics = ["grasp"]`. How one of a user's own is made and
-registered: docs/reference/system_file.md, "Metrics".
+registered: docs/reference/metrics.md.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def register_group(name: str, group: Group) -> None:
     """Let system files ask for a group by that name, in this process and those of its sweeps.
 
     A group of an installed package needs no call: it is an entry point of `grasp_cosim.groups`.
-    InputError for a name that our group has, or where it is no Group.
+    InputError for the name of a built-in group, or where it is no Group.
     """
     register_here("groups", name, _checked(name, group))
 
@@ -84,15 +84,17 @@ def check_groups(system: Any) -> list[str]:
     return [note for name in system.metrics for note in group_of(name).check(system)]
 
 
-def check_needs(own: Metric, signals: Collection[str], roles: Mapping[str, str]) -> None:
+def check_needs(users_metric: Metric, signals: Collection[str], roles: Mapping[str, str]) -> None:
     """InputError if a user's metric, unless it is optional, needs another signal than these."""
-    if own.group or own.optional:
+    if users_metric.group or users_metric.optional:
         return
-    sized = own.of(signals, roles)
+    sized = users_metric.of(signals, roles)
     for need in sized.needs:
         if reason := lacking((need,), signals, roles, sized.needs):
             first = resolved(names_of(need)[0], roles)
-            raise InputError(f"metric {own.name!r}: {reason}; {nearest(first, sorted(signals))}")
+            raise InputError(
+                f"metric {users_metric.name!r}: {reason}; {nearest(first, sorted(signals))}"
+            )
 
 
 def chosen(

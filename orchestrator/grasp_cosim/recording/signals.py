@@ -1,4 +1,4 @@
-"""The signals that our run has recorded, and logs of others, read from their files."""
+"""The signals of runs that were recorded here, and logs of other tools, read from their files."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace

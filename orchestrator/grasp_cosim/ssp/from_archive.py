@@ -1,7 +1,7 @@
 """From an archive to a system.
 
 What the archive holds is run or refused by name; what the standard lets a tool decide is decided
-here, as docs/reference/system_file.md describes, and said in the notes of the system.
+here, as docs/reference/ssp.md describes, and said in the notes of the system.
 """
 
 import math

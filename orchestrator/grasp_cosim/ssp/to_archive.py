@@ -1,4 +1,4 @@
-"""From a system to an SSP 1.0 archive, as docs/reference/system_file.md describes it.
+"""From a system to an SSP 1.0 archive, as docs/reference/ssp.md describes it.
 
 The same system gives the same bytes. What SSP has no form for: annotations.py.
 """

@@ -38,7 +38,7 @@ FMU_ENTRY = re.compile(r"[^#]*\bfmu\s*=")
 
 
 def read_toml(path: Path, fmus: Path | None, stimuli: Stimuli | None) -> dict[str, Any]:
-    """The attributes of the system of a TOML file; fmus is where its FMUs are, by default next to.
+    """The attributes of the system of a TOML file; fmus is the folder of its FMUs, or None.
 
     stimuli go before those that it names.
     """
