@@ -112,3 +112,24 @@ def test_a_run_records_it_in_joule():
     assert result.units["finger.exchange_energy"] == "J"
     expected = -1.5e-3 * np.arange(6)
     assert result["finger.exchange_energy"] == pytest.approx(expected, rel=1e-12, abs=1e-15)
+
+
+def test_the_grasp_has_a_bond_per_finger(grasp):
+    found = bonds(grasp)
+    assert found == tuple(
+        Bond(
+            "plant",
+            j,
+            Port("plant", f"force[{j}]"),
+            Port("controller", f"force[{j}]"),
+            Port("plant", f"position[{j}]"),
+            Port("controller", f"position[{j}]"),
+            1,
+            1.0,
+        )
+        for j in (1, 2)
+    )
+    assert [(b.signal.name, b.signal.unit, b.signal.kind) for b in found] == [
+        ("plant.exchange_energy[1]", "J", "Real"),
+        ("plant.exchange_energy[2]", "J", "Real"),
+    ]

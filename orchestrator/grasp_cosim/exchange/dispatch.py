@@ -2,26 +2,34 @@
 
 import os
 import time
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from ..base.errors import SimulationError
 from ..base.system_calls import end_fork
-from ..interface.units import IDENTITY
-from ..system.connectors import taps
+from ..interface.units import IDENTITY, Conversion
+from ..system.connectors import Tap, taps
 from ..system.description import System
 from ..system.parts import Port
 from ..system.settings import run_settings
-from ..system.validity import transforms
+from .bounds import Bounds
 from .divergence import Divergence, largest, to_open_ends
-from .energy import ExchangeEnergy, bonds
+from .energy import bonds
 from .inexact import InexactSignals
-from .listener import Experiment, Floats, Leisurely, Listener, Signal, Steps, Texts
+from .listener import (
+    Experiment,
+    Floats,
+    Leisurely,
+    Listener,
+    Selective,
+    Signal,
+    Steps,
+    Texts,
+)
 
 CONTINUE_ADVICE = 'or let it go on: diverging = "continue"'
 
@@ -29,9 +37,9 @@ CONTINUE_ADVICE = 'or let it go on: diverging = "continue"'
 class Dispatcher:
     """Takes rows of all values and hands every n-th one on, and the last.
 
-    Listeners get the signals that are recorded, in the order of the system, then those that are
-    worked out of every row. The outputs end the run where they run away or are not finite, recorded
-    or not; any other signal is only recorded, as it is.
+    Listeners get the signals that are recorded, in the order of the system, then its own outputs
+    and the energies of its exchanges. The outputs of components end the run where they run away or
+    are not finite, recorded or not; any other signal is only recorded, as it is.
     """
 
     def __init__(
@@ -41,17 +49,19 @@ class Dispatcher:
         listeners: Sequence[Listener],
         every: int = 1,
         texts: Mapping[Port, Texts] = MappingProxyType({}),
-        every_row: Listener | None = None,
+        every_row: Selective | None = None,
+        bounds: Bounds | None = None,
     ) -> None:
         """Begin the listeners of a run.
 
         Args:
             system: The system that runs.
-            slots: The columns of the rows, by output or connected input.
+            slots: The columns of the rows, by output or connected input. The energies are behind.
             listeners: Get the recorded rows.
             every: Every how many steps a row is recorded; the last one always is.
             texts: The tables of the texts of Strings, whose numbers are in the rows.
-            every_row: Gets every row, of all signals that are observed.
+            every_row: Gets every row of the signals that it names.
+            bounds: Bounds that the loop compares values with; without, all rows are looked at.
 
         Raises:
             InputError: A listener cannot begin.
@@ -62,28 +72,32 @@ class Dispatcher:
         self.listener_seconds = 0.0
         """The time in s that the listeners took for their blocks."""
         self._every = every
-        self._columns = np.array([slots[port] for port in system.observed], np.intp)
         observed = {port: _signal(system, port, texts) for port in system.observed}
         watched = {port: observed[port] for port in system.watched}
-        self._watched = _places(observed.values(), watched.values())
+        self._watched = np.array([slots[port] for port in watched], np.intp)
         self._watched_signals = tuple(watched.values())
         sources = {connection.source for connection in system.connections}
         self._unconnected = [port not in sources for port in watched]
         open_ended = to_open_ends(system)
         self._divergence = Divergence(system, watched, open_ended)
-        self._inexact = InexactSignals(system, observed)
+        self._bounds = bounds or Bounds(max(slots.values(), default=-1) + 1)
+        self._inexact = InexactSignals(system, observed, slots)
         self._goes_on = system.diverging == "continue"
         self._may_be_infinite = np.array([self._goes_on or port in open_ended for port in watched])
         self._runaways: list[str] = []
-        self._taps = Taps(system, slots, texts)
-        self._energy = ExchangeEnergy(system.once(bonds), slots, system.once(transforms))
-        computed = (*self._taps.signals, *self._energy.signals)
-        every_signal = (*observed.values(), *computed)
-        recorded = [observed[port] for port in system.recorded]
-        recorded += [signal for signal in computed if system.record.has(signal.name)]
-        self.signals = tuple(recorded)
-        self._recorded = _places(every_signal, self.signals)
-        self._block = np.empty((len(every_signal), 0))
+        by_tap = system.once(taps).items()
+        energies = [bond.signal for bond in system.once(bonds)]
+        every_column = [
+            *(_Column(signal, slots[port]) for port, signal in observed.items()),
+            *(_Column(_of_tap(n, t, texts), slots[t.source], t.change) for n, t in by_tap),
+            *(_Column(signal, len(slots) + i) for i, signal in enumerate(energies)),
+        ]
+        column_of = dict(zip(observed, every_column, strict=False))
+        recorded = [column_of[port] for port in system.recorded]
+        computed = every_column[len(observed) :]
+        recorded += [c for c in computed if system.record.has(c.signal.name)]
+        self._recorded = _Columns(recorded)
+        self.signals = self._recorded.signals
         self.pending: tuple[Steps, Floats] | None = None
         """The last row, where decimation has left it out so far."""
         self.settings = run_settings(system)
@@ -93,7 +107,9 @@ class Dispatcher:
                 listener.begin(experiment, self.signals)
                 ends.callback(listener.end, False)
             if every_row:
-                every_row.begin(experiment, every_signal)
+                names = every_row.names
+                self._for_every_row = _Columns([c for c in every_column if c.signal.name in names])
+                every_row.begin(experiment, self._for_every_row.signals)
             ends.pop_all()  # a listener that has begun is ended here only where the next one fails
 
     @property
@@ -107,45 +123,47 @@ class Dispatcher:
         Its row is the last that is kept.
         """
         end_fork(self._owner)
-        if len(rows) > self._block.shape[1]:
-            self._block = np.empty((len(self._block), len(rows)))
-        columns = self._block[:, : len(rows)].T  # each of them in one piece, which is fast
-        observed = columns[:, : len(self._columns)]
-        observed[:] = rows[:, self._columns]
-        count, message = self._check(steps, _selected(observed, self._watched))
-        self._inexact(steps[:count], observed[:count])
-        steps, columns = steps[:count], columns[:count]
-        first_tap = len(self._columns)
-        first_energy = first_tap + len(self._taps.signals)
-        columns[:, first_tap:first_energy] = self._taps(rows[:count])
-        columns[:, first_energy:] = self._energy(rows[:count])
+        count, message = self._check(steps, rows)
+        steps, rows = steps[:count], rows[:count]
+        self._inexact(steps, rows)
         if self._every_row:
-            self._every_row.block(steps, columns)
-        columns = _selected(columns, self._recorded)
+            self._every_row.block(steps, self._for_every_row(rows))
         self.pending = None
         nth = slice(-int(steps[0]) % self._every, None, self._every)
         if len(steps[nth]):
-            self._hand_on(steps[nth], columns[nth])
+            self._hand_on(steps[nth], self._recorded(rows[nth]))
         if steps[-1] % self._every:
-            self.pending = steps[-1:].copy(), columns[-1:].copy()
+            self.pending = steps[-1:].copy(), self._recorded(rows[-1:])
         if message:
             raise SimulationError(message)
 
     def saved(self) -> tuple[Any, ...]:
         """What the rows until now came to, for restore()."""
         checks = [*self._runaways], self._divergence.saved(), self._inexact.saved()
-        return checks, self._energy.saved(), self.pending
+        return checks, self.pending
 
     def restore(self, saved: tuple[Any, ...]) -> None:
         """Go back to what was saved; what the listeners got is their own concern."""
-        (runaways, divergence, inexact), energy, self.pending = saved
+        (runaways, divergence, inexact), self.pending = saved
         self._runaways = [*runaways]
         self._divergence.restore(divergence)
         self._inexact.restore(inexact)
-        self._energy.restore(energy)
+        self._put_bounds()
+        self._bounds.exceeded[0] = 1  # maybe by a row that waits
 
-    def _check(self, steps: Steps, outputs: Floats) -> tuple[int, str]:
+    def _put_bounds(self) -> None:
+        self._bounds.put(self._watched, self._divergence.bounds, self._may_be_infinite)
+
+    def _check(self, steps: Steps, rows: Floats) -> tuple[int, str]:
         """The number of rows to keep, and what is wrong in the last of them, if anything is."""
+        if not self._bounds.may_be_exceeded:
+            return len(steps), ""
+        count, message = self._look_at(steps, rows[:, self._watched])
+        self._put_bounds()
+        return count, message
+
+    def _look_at(self, steps: Steps, outputs: Floats) -> tuple[int, str]:
+        """As _check(), of the outputs of components."""
         valid_rows, sizes = len(steps), largest(outputs)
         if not np.isfinite(sizes).all():
             valid = np.isfinite(outputs) | (np.isinf(outputs) & self._may_be_infinite)
@@ -208,42 +226,32 @@ def _signal(system: System, port: Port, texts: Mapping[Port, Texts]) -> Signal:
     )
 
 
-class Taps:
-    """The outputs of the system itself, from rows of all values."""
+def _of_tap(name: str, tap: Tap, texts: Mapping[Port, Texts]) -> Signal:
+    """The signal of an output of the system itself."""
+    return Signal(name, tap.unit, tap.kind, tap.description, texts.get(tap.source, Texts()))
 
-    def __init__(
-        self, system: System, slots: Mapping[Port, int], texts: Mapping[Port, Texts]
-    ) -> None:
-        """Slots are the columns of the rows, texts those of Strings."""
-        by_name = system.once(taps)
-        self.signals = tuple(
-            Signal(name, tap.unit, tap.kind, tap.description, texts.get(tap.source, Texts()))
-            for name, tap in by_name.items()
-        )
-        self._columns = np.array([slots[tap.source] for tap in by_name.values()], np.intp)
-        changes = [tap.change for tap in by_name.values()]
+
+class _Column(NamedTuple):
+    """A signal, its column in the rows of the loop, and what converts that."""
+
+    signal: Signal
+    place: int
+    change: Conversion = IDENTITY
+
+
+class _Columns:
+    """Takes the values of signals out of rows of all values."""
+
+    def __init__(self, columns: Sequence[_Column]) -> None:
+        self.signals = tuple(column.signal for column in columns)
+        self._places = np.array([column.place for column in columns], np.intp)
+        changes = [column.change for column in columns]
         self._changes = [(i, change) for i, change in enumerate(changes) if change != IDENTITY]
 
     def __call__(self, rows: Floats) -> Floats:
-        """The outputs in the order of the signals; not finite where a value is beyond a float64."""
-        values: Floats = rows[:, self._columns]
-        if self._changes:
-            with np.errstate(over="ignore", invalid="ignore"):
-                for i, change in self._changes:
-                    values[:, i] = change(values[:, i])
+        """Their values, as (len(rows), len(signals)); inf where one is beyond a float64."""
+        values: Floats = rows[:, self._places]
+        with np.errstate(over="ignore", invalid="ignore"):
+            for i, change in self._changes:
+                values[:, i] = change(values[:, i])
         return values
-
-
-def _places(
-    signals: Collection[Signal], selected: Collection[Signal]
-) -> npt.NDArray[np.intp] | None:
-    """The places of selected signals among all, in their order; None where these are all."""
-    if len(selected) == len(signals):
-        return None
-    place_of = {signal.name: place for place, signal in enumerate(signals)}
-    return np.array([place_of[signal.name] for signal in selected], np.intp)
-
-
-def _selected(columns: Floats, places: npt.NDArray[np.intp] | None) -> Floats:
-    """The columns at these places, each of them in one piece."""
-    return columns if places is None else columns.T[places].T

@@ -90,6 +90,11 @@ class Divergence:
         self._scales[:], self._limits[:], reached, self._over = saved
         self._reached = [*reached]
 
+    @property
+    def bounds(self) -> Floats:
+        """The magnitudes from which on the outputs are looked at; nan where they never are."""
+        return np.full(len(self._limits), NEVER) if self._over else self._limits
+
     def __call__(
         self,
         steps: Steps,

@@ -20,18 +20,15 @@ class InexactSignals:
     not hold exactly and on which nothing depends.
     """
 
-    def __init__(self, system: System, observed: Mapping[Port, Signal]) -> None:
-        """Over the columns of what is observed."""
-        self._system, self._signals = system, tuple(observed.values())
-        self._places = np.array(
-            [
-                place
-                for place, port in enumerate(observed)
-                if port not in system.watched or _is_long(system, port)
-            ],
-            np.intp,
-        )
-        is_integer = [self._signals[place].kind == "Integer" for place in self._places]
+    def __init__(
+        self, system: System, observed: Mapping[Port, Signal], slots: Mapping[Port, int]
+    ) -> None:
+        """Of what is observed; slots are the columns of the rows."""
+        self._system = system
+        ports = [p for p in observed if p not in system.watched or _is_long(system, p)]
+        self._signals = [observed[port] for port in ports]
+        self._places = np.array([slots[port] for port in ports], np.intp)
+        is_integer = [signal.kind == "Integer" for signal in self._signals]
         self._limits = np.where(is_integer, float(EXACT), np.inf)
         self._log: dict[int, str] = {}
 
@@ -49,7 +46,7 @@ class InexactSignals:
         return [self._log[i] for i in sorted(self._log)]
 
     def __call__(self, steps: Steps, rows: Floats) -> None:
-        """Look at rows of all that is observed."""
+        """Look at rows of all values."""
         if not len(self._places):
             return
         columns = rows[:, self._places]
@@ -60,7 +57,7 @@ class InexactSignals:
                 self._log[i] = self._line(i, int(steps[row]), columns[row, i])
 
     def _line(self, i: int, step: int, value: float) -> str:
-        signal = self._signals[self._places[i]]
+        signal = self._signals[i]
         time = seconds(self._system.time_ns(step))
         if signal.kind == "Integer":
             note = "recorded to the 53 bits that a float64 holds"

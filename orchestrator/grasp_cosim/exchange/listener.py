@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
@@ -99,6 +99,14 @@ class Listener(Protocol):
 
     def end(self, complete: bool) -> None:
         """Called once after the last row, also after a failure (complete is then False)."""
+
+
+class Selective(Listener, Protocol):
+    """A listener that gets the signals of some names only."""
+
+    @property
+    def names(self) -> Collection[str]:
+        """The names, also of signals that there may not be."""
 
 
 @runtime_checkable

@@ -98,10 +98,16 @@ class CompiledLoop:
             np.array(plan.connections, "i8, i8, f8, f8"),
             *(np.array(table, np.int64) for table in (plan.casts, buffers, drives)),
             plan.watches,
+            plan.exchanges,
             np.array(calls, _CALL),
         ]
-        operations, *addresses, values, clock, warned = (
-            table.ctypes.data for table in (*tables, plan.values, plan.clock, plan.warned)
+        operations, *addresses, values, clock, warned, magnitudes, exceeded = (
+            table.ctypes.data
+            for table in (
+                *tables,
+                *(plan.values, plan.clock, plan.warned),
+                *(plan.bounds.magnitudes, plan.bounds.exceeded),
+            )
         )
         program = (
             operations,
@@ -111,6 +117,9 @@ class CompiledLoop:
             len(plan.values),
             clock,
             warned,
+            magnitudes,
+            len(plan.bounds.magnitudes),
+            exceeded,
         )
         words = np.array(program, np.int64)
         self._kept = plan, callbacks, tables, words
@@ -187,8 +196,8 @@ def _interpreted(plan: Plan) -> Loop:
     buffers = [memoryview(b) for b in plan.buffers]  # type: ignore[arg-type]
     values, clock = memoryview(plan.values), memoryview(plan.clock)  # type: ignore[arg-type]
     warned = memoryview(plan.warned)  # type: ignore[arg-type]
-    watches = [memoryview(row) for row in plan.watches]
-    tables = plan.operations, plan.connections, plan.casts, plan.drives, watches
+    watches, exchanges = ([memoryview(row) for row in t] for t in (plan.watches, plan.exchanges))
+    tables = plan.operations, plan.connections, plan.casts, plan.drives, watches, exchanges
     calls = [call.python for call in plan.calls]
     run_plan = partial(loop.run, *tables, calls, buffers, values, clock, warned)
 
@@ -253,8 +262,8 @@ def _job() -> Job:
 def _constants() -> list[str]:
     """The numbers that the source shares with the other modules, as macros of a compiler."""
     names_of = {
-        loop: "COPY SCALE STORE LOAD LOAD_LONG DRIVE WATCH CALL STEP TOO_LONG EXACT WORST FULL "
-        "HALTED OVERRUN WATCHED STALLED",
+        loop: "COPY SCALE STORE LOAD LOAD_LONG DRIVE WATCH EXCHANGE CALL STEP TOO_LONG EXACT WORST "
+        "FULL HALTED OVERRUN WATCHED STALLED",
         shapes: "TRANSFER_2 TRANSFER_3 STEP_2 STEP_3 CLOCK PACE",
         timing: "ARRIVED LATE SCHEDULED BEGIN",
     }

@@ -41,6 +41,12 @@ typedef struct { /* the columns of loop.py */
     double slot, relation, value, factor, offset, armed, held;
 } Watch;
 
+typedef struct { /* the columns of loop.py */
+    double held_force, position, force, received, energy, period, scale;
+    double force_factor, force_offset, position_factor, position_offset;
+    double last_position, last_force, last_received;
+} Exchange;
+
 typedef struct { /* of fmi/instance.py, Native */
     int64_t shape;
     void (*function)(void);
@@ -63,11 +69,15 @@ typedef struct {
     const Buffer *buffers;
     Drive *drives;
     Watch *watches;
+    Exchange *exchanges;
     const Call *calls;
     double *values;
     int64_t width;
     double *clock;
     double *warned; /* of each call, how many warnings it returned, and the time of the first */
+    const int64_t *bounds; /* of exchange/bounds.py: of the first values, the bits of a magnitude */
+    int64_t bounded;
+    int64_t *exceeded; /* not 0 once a value has come to its bound */
 } Plan;
 
 typedef struct { /* of system/times.py, in counts: point k is at start + k * step */
@@ -250,6 +260,35 @@ static int holds(Watch *w, const double *values) {
     return is;
 }
 
+/* Add what an exchange has created by the end of a step, as account() of loop.py. */
+static void account(Exchange *e, double *values, int64_t step) {
+    double position = values[(int64_t)e->position];
+    double earned = values[(int64_t)e->held_force] * (position - e->last_position);
+
+    e->last_position = position;
+    if (step % (int64_t)e->period == 0) {
+        double force = e->force_factor * values[(int64_t)e->force] + e->force_offset;
+        double received = values[(int64_t)e->received] - e->position_offset;
+        received = received / e->position_factor;
+        earned += -0.5 * (force + e->last_force) * (received - e->last_received);
+        e->last_force = force;
+        e->last_received = received;
+    }
+    values[(int64_t)e->energy] += e->scale * earned;
+}
+
+/* Write the row of a step, and tell whether a value has come to its bound. */
+static void write_row(const Plan *plan, double *row) {
+    int64_t i, bits, exceeded = 0;
+
+    memcpy(row, plan->values, (size_t)plan->width * sizeof(double));
+    for (i = 0; i < plan->bounded; i++) { /* as integers, magnitudes have the order that they have */
+        memcpy(&bits, &plan->values[i], sizeof bits);
+        exceeded |= (bits & INT64_MAX) >= plan->bounds[i];
+    }
+    if (exceeded) *plan->exceeded = 1;
+}
+
 /* The communication point k in s. */
 static double point(const TimeGrid *grid, int64_t k) {
     return (double)(grid->start + k * grid->step) / grid->per_second;
@@ -302,6 +341,9 @@ static int operate(const Plan *plan, const Operation *operation, int64_t k, cons
         }
         return 0;
     case WATCH: return holds(&plan->watches[begin], values) ? WATCHED : 0;
+    case EXCHANGE:
+        for (i = begin; i < end; i++) account(&plan->exchanges[i], values, k + 1);
+        return 0;
     default: /* LOAD and LOAD_LONG */
         for (i = begin; i < end; i++) {
             const Cast *c = &plan->casts[i];
@@ -342,7 +384,7 @@ int64_t run(const Plan *plan, double *rows, int64_t room, int64_t row, int64_t o
             }
         }
         operation = 0;
-        memcpy(rows + row * plan->width, plan->values, (size_t)plan->width * sizeof(double));
+        write_row(plan, rows + row * plan->width);
         if (++row == room) row = 0;
         __atomic_store_n(&shared->done, k + 1, __ATOMIC_RELEASE);
     }

@@ -10,15 +10,23 @@ from typing import Any
 
 from ..base import checks
 
-COPY, SCALE, STORE, LOAD, LOAD_LONG, DRIVE, WATCH, CALL, STEP = range(9)  # calls last
+COPY, SCALE, STORE, LOAD, LOAD_LONG, DRIVE, WATCH, EXCHANGE, CALL, STEP = range(10)  # calls last
 """Operations: over connections COPY and SCALE; over casts STORE into a buffer of another type, LOAD
-from one, LOAD_LONG with a check; over drives DRIVE; over watches WATCH; over calls CALL and STEP,
-which sets the clock before it.
+from one, LOAD_LONG with a check; over drives DRIVE; over watches WATCH; over exchanges of energy
+EXCHANGE; over calls CALL and STEP, which sets the clock before it.
 """
 
 SLOT, RELATION, VALUE, FACTOR, OFFSET, ARMED, HELD = range(7)
 """The columns of a watch: of which signal, compared how with what, after factor and offset; whether
 the loop ends where it holds, which it does once; in how many steps it has held.
+"""
+
+HELD_FORCE, POSITION, FORCE, RECEIVED, ENERGY, PERIOD, SCALE_TO_J = range(7)
+FORCE_FACTOR, FORCE_OFFSET, POSITION_FACTOR, POSITION_OFFSET = range(7, 11)
+LAST_POSITION, LAST_FORCE, LAST_RECEIVED = range(11, 14)
+"""The columns of an exchange: the slots of F_held, x, F, s and E of exchange/energy.py, the step of
+the source in base steps, and J of one unit; what converts its force and position to the units of
+the component that moves; x, F and s of the last step that counted.
 """
 
 TOO_LONG = 100
@@ -46,6 +54,7 @@ def run(
     casts: Sequence[tuple[int, int, int]],
     drives: Sequence[Any],
     watches: Sequence[Sequence[float]],
+    exchanges: Sequence[Any],
     calls: Sequence[Callable[[], int]],
     buffers: Sequence[Any],
     values: Any,
@@ -98,6 +107,9 @@ def run(
                 elif kind == WATCH:
                     if holds(watches[begin], values):
                         return k, operation, WATCHED
+                elif kind == EXCHANGE:
+                    for exchange in exchanges[begin:end]:
+                        account(exchange, values, k + 1)
                 else:
                     for buffer, index, slot in casts[begin:end]:
                         value = float(buffers[buffer][index])
@@ -124,6 +136,26 @@ def holds(watch: Any, values: Any) -> bool:
     watch[ARMED] = 0.0
     watch[HELD] += 1.0
     return armed
+
+
+def account(exchange: Any, values: Any, step: int) -> None:
+    """Add what an exchange has created by the end of a step: the sum of exchange/energy.py."""
+    position = values[int(exchange[POSITION])]
+    earned = values[int(exchange[HELD_FORCE])] * (position - exchange[LAST_POSITION])
+    exchange[LAST_POSITION] = position
+    if step % int(exchange[PERIOD]) == 0:
+        force, received = answered(exchange, values)
+        moved = received - exchange[LAST_RECEIVED]
+        earned += -0.5 * (force + exchange[LAST_FORCE]) * moved
+        exchange[LAST_FORCE], exchange[LAST_RECEIVED] = force, received
+    values[int(exchange[ENERGY])] += exchange[SCALE_TO_J] * earned
+
+
+def answered(exchange: Any, values: Any) -> tuple[float, float]:
+    """Force and position of the source, in the units of the component that moves."""
+    force = exchange[FORCE_FACTOR] * values[int(exchange[FORCE])] + exchange[FORCE_OFFSET]
+    received = values[int(exchange[RECEIVED])] - exchange[POSITION_OFFSET]
+    return force, received / exchange[POSITION_FACTOR]
 
 
 def note_warning(warned: Any, call: int, time: float) -> None:

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from ..base.checks import exact
 from ..base.errors import InputError, SimulationError
+from ..exchange.bounds import Bounds
 from ..exchange.listener import Texts
 from ..fmi.instance import DUE, EVENT, FATAL, Instance
 from ..interface.fmi_types import Value
@@ -28,6 +29,7 @@ from .drives import drives_of
 from .end import RunEnd
 from .engine import CompiledLoop, Engine, make_loop
 from .exchanged import exchanged
+from .exchanges import begin, exchanges_of
 from .fault_windows import NO_CUTS, Cut
 from .plan import Planner
 from .rows import RowBuffer
@@ -94,7 +96,10 @@ class Master:
         moved = system.once(exchanged)
         self.slots = moved.slots()
         self.texts = {port: Texts() for port in moved.texts}
-        self.values = np.zeros(len(self.slots) + self._extra_values)
+        self.exchanges = exchanges_of(system, self.slots)
+        self.bounds = Bounds(len(self.slots))
+        """The magnitudes from which on a value of a row must be looked at."""
+        self.values = np.zeros(self._first_extra_value + self._extra_values)
         self.scenario = Scenario(system, instances, self.slots, self.values, cuts)
         interfaces = {instance.name: instance.interface for instance in instances}
         self.watches = Watches(system, interfaces, self.slots)
@@ -107,7 +112,11 @@ class Master:
 
     _pacer: Pacer | None = None
     _extra_values = 0
-    """Values in a row in addition to those of the slots."""
+    """Values in a row in addition to those of the slots and the energies."""
+
+    @property
+    def _first_extra_value(self) -> int:
+        return len(self.slots) + len(self.exchanges)
 
     @property
     def _max_rows(self) -> int:
@@ -131,12 +140,16 @@ class Master:
             self.texts,
             self._drives,
             self.watches.table,
+            self.exchanges,
+            self.bounds,
             self._pacer,
         )
         self.plan = planner.plan()
         # In real time the loop is compiled where it can be, however short the run is.
         steps = None if self._pacer else self.total_steps
         self._loop = make_loop(self.plan, self._engine, steps)
+        # By the clock rows may be handed on while the loop goes on, and finds more.
+        self.bounds.compared = isinstance(self._loop, CompiledLoop) and not self._pacer
 
     def read(self, port: Port) -> Value:
         """The present value of any variable, from its FMU."""
@@ -151,6 +164,7 @@ class Master:
         mode, and inputs that agree with them. SimulationError where a limit is exceeded there.
         """
         self._initialise_at(0)
+        begin(self.exchanges, self.values)
         self._receive(np.zeros(1, np.int64), self.values[np.newaxis])
         self._rows.note_time()
         if reason := self.watches.at_start(self.values):
@@ -211,7 +225,8 @@ class Master:
         waiting = rows.waiting(steps_done)
         fresh = waiting[max(first - rows.handed_on, 0) :]
         is_wrapped = len(waiting) < steps_done - rows.handed_on  # some are at the beginning again
-        if is_wrapped or self._are_enough(len(waiting)) or not all_finite(fresh):
+        is_finite = not self.bounds.may_be_exceeded or all_finite(fresh)
+        if is_wrapped or self._are_enough(len(waiting)) or not is_finite:
             self.hand_on()
         return steps_done - first
 
@@ -273,7 +288,7 @@ class Master:
     def _state_arrays(self) -> Sequence[npt.NDArray[Any]]:
         """The arrays of the plan that change from step to step."""
         plan = self.plan
-        return plan.values, plan.clock, plan.warned, *plan.buffers
+        return plan.values, plan.clock, plan.warned, self.exchanges, *plan.buffers
 
     def restore(self, saved: Any) -> None:
         """Go back to what was saved; SimulationError where an FMU fails."""

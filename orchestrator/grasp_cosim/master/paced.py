@@ -53,7 +53,7 @@ class PacedMaster(Master):
         self._cpus = cpus() if self.runs_alone else []
 
     def _make_loop(self) -> None:
-        self._pacer.bind(self.values[len(self.slots) :], self._hand_on_until)
+        self._pacer.bind(self.values[self._first_extra_value :], self._hand_on_until)
         super()._make_loop()
 
     @property
@@ -154,7 +154,7 @@ class PacedMaster(Master):
 
     def _deliver(self, numbers: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Give the wall times in the rows to the meter, and the rows to who receives them."""
-        times = rows[:, len(self.slots) :]
+        times = rows[:, self._first_extra_value :]
         if self.runs_alone:
             self._pacer.meter.add(numbers - 1, times)
             self._receive(numbers, rows)

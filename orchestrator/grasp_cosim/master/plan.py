@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.calls import Call
+from ..exchange.bounds import Bounds
 from ..exchange.listener import Texts
 from ..fmi.instance import CLOCK, Instance, dtype
 from ..interface.variables import Variable
@@ -25,7 +26,21 @@ from ..system.times import in_seconds
 from ..system.validity import transforms
 from .drives import Drive
 from .exchanged import exchanged, used
-from .loop import CALL, COPY, DRIVE, HELD, LOAD, LOAD_LONG, RAISED, SCALE, STEP, STORE, WATCH
+from .exchanges import NO_EXCHANGES
+from .loop import (
+    CALL,
+    COPY,
+    DRIVE,
+    EXCHANGE,
+    HELD,
+    LOAD,
+    LOAD_LONG,
+    RAISED,
+    SCALE,
+    STEP,
+    STORE,
+    WATCH,
+)
 from .scenario import Scenario
 
 LONG = 8
@@ -53,6 +68,10 @@ class Plan:
     drives: list[Drive] = field(default_factory=list)
     watches: npt.NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, HELD + 1)))
     """Conditions that the loop looks at after each step: those of Planner.watched, in its order."""
+    exchanges: npt.NDArray[np.float64] = field(default_factory=NO_EXCHANGES.copy)
+    """Exchanges of energy, with the columns that loop.py names."""
+    bounds: Bounds = field(default_factory=lambda: Bounds(0))
+    """What the compiled loop compares the first values of each row with."""
     calls: list[Call] = field(default_factory=list)
     owners: list[Instance | None] = field(default_factory=list)
     """By call, the instance that it is made to; None for a call of the master's own."""
@@ -77,6 +96,8 @@ class Planner:
     texts: Mapping[Port, Texts]
     drives: Mapping[Port, Drive]
     watches: npt.NDArray[np.float64]
+    exchanges: npt.NDArray[np.float64]
+    bounds: Bounds
     pacer: Pacer | None = None
 
     def __post_init__(self) -> None:
@@ -93,7 +114,13 @@ class Planner:
         self.strings: dict[str, list[Port]] = {name: [] for name in self.instances}
         for port in self.texts:
             self.strings[port.component].append(port)
-        self.made = Plan(self.values, np.zeros(len(CLOCK)), watches=self.watches)
+        self.made = Plan(
+            self.values,
+            np.zeros(len(CLOCK)),
+            watches=self.watches,
+            exchanges=self.exchanges,
+            bounds=self.bounds,
+        )
         self.view: Any = memoryview(self.values)  # type: ignore[arg-type]  # numpy's 3.11 stubs
 
     def plan(self) -> Plan:
@@ -121,6 +148,7 @@ class Planner:
             for name in names:
                 self._step(name)
                 self._stamp()
+        self._operation(EXCHANGE, 0, len(self.exchanges), 1, 0)
         for i in range(len(self.watches)):
             self._operation(WATCH, i, i + 1, 1, 0)
         waits, *other_calls = self.made.calls

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..exchange.bounds import Bounds
 from ..exchange.dispatch import Dispatcher
 from ..exchange.listener import Listener, Signal, Texts
 from ..interface.units import Conversion
@@ -52,12 +53,16 @@ class RunRecord:
             self._every_row = EveryRow(signals)
 
     def begin(
-        self, slots: Mapping[Port, int], texts: Mapping[Port, Texts], listeners: Sequence[Listener]
+        self,
+        slots: Mapping[Port, int],
+        texts: Mapping[Port, Texts],
+        bounds: Bounds,
+        listeners: Sequence[Listener],
     ) -> None:
-        """Begin the listeners. Slots are the columns of the rows, texts those of Strings there."""
+        """Begin the listeners; slots, texts and bounds are those of the master."""
         receivers = (self._memory, *listeners)
         self.dispatcher = Dispatcher(
-            self._system, slots, receivers, self._every, texts, self._every_row
+            self._system, slots, receivers, self._every, texts, self._every_row, bounds
         )
         self._at_start = self.saved()
 

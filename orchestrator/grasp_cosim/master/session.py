@@ -190,7 +190,8 @@ class Session:
             if self.pacer
             else Master(self.system, instances, rows_to, engine, renew, cuts)
         )
-        self._record.begin(self.master.slots, self.master.texts, listeners)
+        master = self.master
+        self._record.begin(master.slots, master.texts, master.bounds, listeners)
         if self.pacer:
             self.pacer.spare = self._record.dispatcher.spare
         self._stack.callback(self._hand_over)  # before the FMUs are ended, and after:

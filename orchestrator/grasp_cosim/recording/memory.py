@@ -143,13 +143,12 @@ class EveryRow:
     """
 
     def __init__(self, names: Collection[str]) -> None:
-        self._names, self._rows, self.lost = names, 0, ""
+        self.names, self._rows, self.lost = names, 0, ""
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Open the file, in which a row comes after the other."""
         self._experiment = experiment
-        self._places = [i for i, s in enumerate(signals) if s.name in self._names]
-        self._signals = [signals[i] for i in self._places]
+        self._signals = tuple(signals)
         self._open()
 
     def _open(self, rows: int = 0) -> None:
@@ -159,7 +158,7 @@ class EveryRow:
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Write what these rows have of the signals."""
-        unwritten = memoryview(b"" if self.lost else rows[:, self._places].tobytes())
+        unwritten = memoryview(b"" if self.lost else rows.tobytes())
         try:
             while unwritten:
                 unwritten = unwritten[self._storage.medium.write(unwritten) :]
@@ -179,7 +178,7 @@ class EveryRow:
     def restore(self, saved: "tuple[_Storage[Any], int]") -> None:
         """Go back to what was saved; other states stay."""
         self._storage, self._rows = saved
-        size = 8 * self._rows * len(self._places)
+        size = 8 * self._rows * len(self._signals)
         if self.lost:
             return
         if self._rows < self._storage.shared_rows:
@@ -191,7 +190,7 @@ class EveryRow:
 
     def columns(self) -> Columns:
         """All communication points in s so far, and the columns, mapped from the file."""
-        shape = self._rows, len(self._places)
+        shape = self._rows, len(self._signals)
         table = (
             np.memmap(self._storage.medium, np.float64, "r", shape=shape)
             if all(shape)

@@ -1,16 +1,27 @@
-"""The energy of a sampled exchange: the exact drift of a mass on a sampled spring."""
+"""The energy of a sampled exchange, as both loops add it up: the exact drift of a mass on a sampled
+spring.
+"""
 
+import itertools
+from array import array
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 import pytest
-from grasp_cosim.exchange.energy import Bond, ExchangeEnergy, bonds
+from grasp_cosim.exchange.energy import Bond
+from grasp_cosim.master.drives import Drive
+from grasp_cosim.master.engine import make_loop
+from grasp_cosim.master.exchanges import begin, table_of
+from grasp_cosim.master.loop import DRIVE, EXCHANGE
+from grasp_cosim.master.plan import Plan
 from grasp_cosim.system.parts import Port
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
-from support.marks import examples
+from support.marks import engines, examples, needs_compiler
+
+pytestmark = needs_compiler
 
 Array = npt.NDArray[np.float64]
 
@@ -65,54 +76,73 @@ def _run(spring=1, mass=1, late=0):
     return Run(np.array(rows), np.array(velocity))
 
 
-def _energy(rows, bond=BOND):
-    return ExchangeEnergy([bond], COLUMN)(rows)[:, 0]
+def _energies(rows, engine, found=(BOND,), transforms=(), cuts=()):
+    """The energies of bonds in each row, as a loop adds them up in steps between the cuts."""
+    table = table_of(found, COLUMN, dict(transforms))
+    values = np.zeros(len(COLUMN) + len(found))
+    values[: len(COLUMN)] = rows[0]
+    begin(table, values)
+    energies = [values[len(COLUMN) :].copy()]
+    times = array("q", range(len(rows)))
+    drives = [Drive(i, times, array("d", rows[1:, i]), linear=False) for i in COLUMN.values()]
+    operations = [(DRIVE, 0, len(drives), 1, 0), (EXCHANGE, 0, len(found), 1, 0)]
+    plan = Plan(values, np.zeros(3), operations, drives=drives, exchanges=table)
+    loop = make_loop(plan, engine)
+    ends = [0, *sorted(cuts), len(rows) - 1]
+    for start, stop in itertools.pairwise(ends):
+        piece = np.empty((max(stop - start, 1), len(values)))
+        assert loop(piece, 0, start, stop, 0, 1, 1) == (stop, 0, 0)
+        energies += [*piece[: stop - start, len(COLUMN) :]]
+    return np.array(energies)
 
 
+@engines
 @pytest.mark.parametrize("run", [_run(), _run(late=1), _run(mass=2)])
-def test_it_is_the_drift_of_the_total_energy(run):
+def test_it_is_the_drift_of_the_total_energy(run, engine):
     total = 0.5 * STIFFNESS * run.rows[0, 1] ** 2
     assert run.drift[-1] > 1.0 * total
-    assert _energy(run.rows) == pytest.approx(run.drift, rel=1e-12, abs=1e-12 * total)
+    energy = _energies(run.rows, engine)[:, 0]
+    assert energy == pytest.approx(run.drift, rel=1e-12, abs=1e-12 * total)
 
 
+@engines
 @pytest.mark.parametrize("period", [2, 4])
-def test_a_slow_source_answers_for_its_own_steps(period):
+def test_a_slow_source_answers_for_its_own_steps(period, engine):
     """In between, the spring has seen a position that it has no force for yet."""
     run = _run(spring=period)
-    energy = _energy(run.rows, replace(BOND, period=period))
+    energy = _energies(run.rows, engine, [replace(BOND, period=period)])[:, 0]
     done = slice(None, None, period)
     assert energy[done] == pytest.approx(run.drift[done], rel=1e-11, abs=1e-14)
 
 
-def test_values_that_are_not_finite_are_passed_on_without_a_warning():
+@engines
+def test_values_that_are_not_finite_are_passed_on_without_a_warning(engine):
     rows = _run().rows[:4].copy()
     rows[2:, 1] = np.inf
-    assert np.isfinite(_energy(rows)).tolist() == [True, True, False, False]
+    energy = _energies(rows, engine)[:, 0]
+    assert np.isfinite(energy).tolist() == [True, True, False, False]
 
 
-def test_units_of_the_source_are_those_of_the_connections():
+@engines
+def test_units_of_the_source_are_those_of_the_connections(engine):
     """A spring in mm from another origin and kN, connections that convert, and a mass in cm."""
     run = _run()
     rows = run.rows * [1e-3, 100.0, 1.0, 1e3] + [0.0, 0.0, 0.0, 40.0]
-    energies = ExchangeEnergy(
-        [replace(BOND, scale=0.01)], COLUMN, {HELD: (1e3, 0.0), SEEN: (10.0, 40.0)}
-    )(rows)
+    transforms = {HELD: (1e3, 0.0), SEEN: (10.0, 40.0)}
+    energies = _energies(rows, engine, [replace(BOND, scale=0.01)], transforms)
     assert energies[:, 0] == pytest.approx(run.drift, rel=1e-9, abs=1e-14)
 
 
 @examples()
 @given(
     rows=arrays.arrays(np.float64, (23, 4), elements=st.floats(-1e6, 1e6)),
-    cuts=st.lists(st.integers(0, 23), max_size=6),
+    cuts=st.lists(st.integers(0, 22), max_size=6),
     period=st.integers(1, 5),
 )
-def test_blocks_of_any_size_give_the_same_bits(rows, cuts, period):
+def test_both_loops_give_the_same_bits_in_any_pieces(rows, cuts, period):
     both = [replace(BOND, period=period), replace(BOND, received=None)]
-    whole = ExchangeEnergy(both, COLUMN)(rows)
-    energy = ExchangeEnergy(both, COLUMN)
-    parts = [energy(part.copy()) for part in np.split(rows, sorted(cuts))]
-    assert np.concatenate(parts).tobytes() == whole.tobytes()
+    whole = _energies(rows, "python", both)
+    assert _energies(rows, "compiled", both, cuts=cuts).tobytes() == whole.tobytes()
 
 
 def _by_the_formula(rows, bond, transforms):
@@ -131,53 +161,12 @@ def _by_the_formula(rows, bond, transforms):
     return np.array(energies)
 
 
+@engines
 @pytest.mark.parametrize("period", [1, 2, 3, 7])
-@pytest.mark.parametrize("block", [1, 4, 5, 40])
 @pytest.mark.parametrize("transforms", [{}, {HELD: (3.0, -0.5), SEEN: (10.0, 0.25)}])
-def test_blocks_of_any_size_follow_the_formula(period, block, transforms):
-    """Also where the ends of the source's steps are anywhere in a block, and after a way back."""
+def test_it_follows_the_formula(period, transforms, engine):
     rows = np.random.default_rng(period).standard_normal((40, 4))
     bond = replace(BOND, period=period, scale=1e-3)
-    energy = ExchangeEnergy([bond], COLUMN, transforms)
     expected = _by_the_formula(rows, bond, transforms)
-    start = energy.saved()
-    for _ in range(2):
-        blocks = [energy(rows[first : first + block])[:, 0] for first in range(0, 40, block)]
-        assert np.concatenate(blocks) == pytest.approx(expected, rel=1e-12, abs=1e-15)
-        energy.restore(start)
-    middle = energy(rows[:block]), energy.saved()
-    energy(rows[::-1])
-    energy.restore(middle[1])
-    after = energy(rows[block : 2 * block])[:, 0]
-    assert after == pytest.approx(expected[block : 2 * block], rel=1e-12, abs=1e-15)
-
-
-def test_the_grasp_has_a_bond_per_finger(grasp):
-    found = bonds(grasp)
-    assert found == tuple(
-        Bond(
-            "plant",
-            j,
-            Port("plant", f"force[{j}]"),
-            Port("controller", f"force[{j}]"),
-            Port("plant", f"position[{j}]"),
-            Port("controller", f"position[{j}]"),
-            1,
-            1.0,
-        )
-        for j in (1, 2)
-    )
-    ports = (p for b in found for p in (b.force, b.source, b.position, b.received))
-    signals = ExchangeEnergy(found, dict.fromkeys(ports, 0)).signals
-    assert [(s.name, s.unit, s.kind) for s in signals] == [
-        ("plant.exchange_energy[1]", "J", "Real"),
-        ("plant.exchange_energy[2]", "J", "Real"),
-    ]
-    assert "plant.force[1]" in signals[0].description
-
-
-def test_the_source_keeps_its_own_step(grasp):
-    slow = replace(grasp.component("controller", "test"), step_ns=4 * grasp.step_ns)
-    components = tuple(slow if c.name == slow.name else c for c in grasp.components)
-    system = replace(grasp, components=components)
-    assert [b.period for b in bonds(system)] == [4, 4]
+    energy = _energies(rows, engine, [bond], transforms)[:, 0]
+    assert energy == pytest.approx(expected, rel=1e-12, abs=1e-15)
