@@ -244,8 +244,8 @@ def load(load_as, kind):
 
 @pytest.fixture(scope="session")
 def grasp(fmus):
-    """The built-in grasp."""
-    return System.load(SYSTEM, fmus)
+    """The built-in grasp, of the FMUs in Python."""
+    return System.load(SYSTEM, fmus).natively(False)
 
 
 @pytest.fixture

@@ -34,8 +34,8 @@ from .options import (
     chosen_system,
     each_once,
     load_system,
-    many_runs_option,
     map_option,
+    native_option,
     natively,
     preset_option,
     set_option,
@@ -61,7 +61,7 @@ OF_CANDIDATE = ("rename", "units", "isolation")
     help="TOML file with bands, or the JSON of a qualification. Default: bands that are derived "
     "from runs of the original.",
 )
-@many_runs_option
+@native_option
 @metrics_option
 @click.option("-o", "--out", type=PATH, help="Page to write, such as qualification.html.")
 @json_option

@@ -23,18 +23,12 @@ from .frame import PATH, pair, say, waiting
 Command = Callable[..., Any]
 
 
-def native_option(default: str) -> Command:
-    """The option of commands that run systems; `default` says what they do without it."""
-    return click.option(
-        "--native/--python",
-        default=None,
-        help="Run native twins in the place of Python FMUs, or the Python FMUs. Both give the same "
-        f"bits. Default: {default}",
-    )
-
-
-many_runs_option = native_option("native, if there is a C compiler.")
-"""The option of commands that do many runs."""
+native_option = click.option(
+    "--native/--python",
+    default=None,
+    help="Run native twins in the place of Python FMUs, or the Python FMUs. Both give the same "
+    "bits. Default: native, where a twin is known and there is a C compiler.",
+)
 
 
 def natively(system: System, native: bool | None) -> System:

@@ -14,7 +14,7 @@ from ..grasp.system import grasp_system
 from ..recording.log_names import LogNames
 from ..system.overrides import Override
 from .frame import NEGATIVE, PATH, is_quiet, json_option, show
-from .options import controller_option, many_runs_option, map_option, set_option
+from .options import controller_option, map_option, native_option, set_option
 
 
 @click.command()
@@ -29,7 +29,7 @@ from .options import controller_option, many_runs_option, map_option, set_option
     default=Path("results"),
     help="Folder for the page evaluation.html and the numbers.",
 )
-@many_runs_option
+@native_option
 @json_option
 def evaluate(
     bench: bool, controller: str | None, out: Path, native: bool | None, as_json: bool

@@ -58,7 +58,7 @@ from .options import (
 @record_option
 @values_option
 @metrics_option
-@native_option("the FMUs that SYSTEM names; native for the built-in grasp.")
+@native_option
 @click.option("--realtime", is_flag=True, help="Pace the run by the clock, and print its timing.")
 @click.option(
     "--every", type=click.IntRange(1), default=1, metavar="N", help="Record only every N-th step."
@@ -114,7 +114,7 @@ def run(
     if mdf:
         check_mdf()
     check_outputs(out, plot)
-    chosen = system if native is None and options.system else natively(system, native)
+    chosen = natively(system, native)
     command = ("grasp-cosim", *click.get_current_context().find_root().obj)
     with RunFolder(out, chosen, command, realtime, form=form) if out else nullcontext() as folder:
 

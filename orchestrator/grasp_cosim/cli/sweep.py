@@ -33,7 +33,7 @@ from .frame import (
 from .options import (
     SystemOptions,
     chosen_system,
-    many_runs_option,
+    native_option,
     overrides_of,
     swap_options,
     system_options,
@@ -56,7 +56,7 @@ TABLE = Path("sweep.csv")
 @system_options
 @swap_options
 @metrics_option
-@many_runs_option
+@native_option
 @click.option(
     "-o",
     "--out",

@@ -252,7 +252,10 @@ def prepare_swap(
         for name, value in extra.items():
             text = f"--set {component}.{name}"
             new_values |= parse_values(interface, text, name, value, text=True)
-        new = replace(new, name=component, values=new_values, isolation=isolation)
+        # The file itself is to be judged, not a twin of it.
+        new = replace(
+            new, name=component, values=new_values, isolation=isolation, native=None, as_named=True
+        )
         try:
             swapped = _with_component(system, new)
         except InputError as error:

@@ -178,7 +178,7 @@ class EventInstance(Fmi3Instance):
             steps = float(time) / step
             if abs(steps - round(steps)) * step > AT_POINT:
                 raise InputError(
-                    f"{self.name}: {self.interface.path.name}: clock {v.name!r} ticks within steps "
+                    f"{self.name}: {self.interface.file_name}: clock {v.name!r} ticks within steps "
                     f"of {step:g} s, which cannot vary; must have a step that divides "
                     f"{float(time):g} s"
                 )

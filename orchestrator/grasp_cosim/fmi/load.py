@@ -54,7 +54,7 @@ def load_here(
         from .model_exchange import Fmi2Model, Fmi3Model  # loads the solver's libraries
     except OSError as error:
         raise InputError(
-            f"{name}: {interface.path.name} is for model exchange, and FMPy has no CVode for "
+            f"{name}: {interface.file_name} is for model exchange, and FMPy has no CVode for "
             f"this machine: {error}; must be a co-simulation FMU"
         ) from error
     model = Fmi3Model if three else Fmi2Model

@@ -471,7 +471,7 @@ class LoadedInstance(ABC):
         """InputError where the numbers of the state are not known."""
         if not (self.interface.ours and self.interface.has_states):
             raise InputError(
-                f"{self.name}: the states of {self.interface.path.name} are not known one by one; "
+                f"{self.name}: the states of {self.interface.file_name} are not known one by one; "
                 "must be an FMU that grasp-cosim build made of a block"
             )
 
@@ -491,7 +491,7 @@ class LoadedInstance(ABC):
     def _has_no_state(self, reason: str) -> InputError:
         """The error where the state is asked for."""
         return InputError(
-            f"{self.name}: the state of {self.interface.path.name} {reason}; must be a "
+            f"{self.name}: the state of {self.interface.file_name} {reason}; must be a "
             "co-simulation FMU with fmi2GetFMUstate or fmi3GetFMUState"
         )
 
@@ -522,7 +522,7 @@ class LoadedInstance(ABC):
         logged = self._messages.reasons()
         explanation = as_reason(logged) or advice
         error = SimulationError(
-            f"{self.name}: {self.interface.path.name} {reason} at t = {time:.9g} s{must}"
+            f"{self.name}: {self.interface.file_name} {reason} at t = {time:.9g} s{must}"
             f"{explanation}{self._inputs}"
         )
         for text in logged:
@@ -568,7 +568,7 @@ class LoadedInstance(ABC):
             if not reason:
                 reason = f": {error}{self._advice(error.status)}"
             raise InputError(
-                f"{self.name}: {self.interface.path.name} refused its initialisation"
+                f"{self.name}: {self.interface.file_name} refused its initialisation"
                 f"{reason}{self._inputs}"
             ) from error
         except MissingFunctionError as error:

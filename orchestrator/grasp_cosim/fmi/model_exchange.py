@@ -268,7 +268,7 @@ class ModelInstance(LoadedInstance):
         crossings = self._evaluation(self._get_indicators, self._indicators)
         if self._states > MAX_STATES:
             raise InputError(
-                f"{self.name}: {self.interface.path.name} has {self._states} continuous states; "
+                f"{self.name}: {self.interface.file_name} has {self._states} continuous states; "
                 f"must have {MAX_STATES} at most"
             )
         if self._states or self._indicators:

@@ -327,7 +327,7 @@ class ProcessInstance:
         logged = [line.removeprefix(LOGGED) for line in self._printed if line.startswith(LOGGED)]
         reason = f": {' '.join(logged[-1].split())}" if logged else ""
         self._loss = SimulationError(
-            f"{self.name}: the process of {self.interface.path.name} {ending} "
+            f"{self.name}: the process of {self.interface.file_name} {ending} "
             f"at t = {self._shared.clock[0]:.9g} s{reason}{self._inputs}"
         )
         for line in self._printed:

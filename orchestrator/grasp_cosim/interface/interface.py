@@ -76,6 +76,11 @@ class Interface:
         """The FMU as messages name it."""
         return without_scratch(str(self.user_path or self.path))
 
+    @property
+    def file_name(self) -> str:
+        """The name of its file as messages name it."""
+        return (self.user_path or self.path).name
+
     @cached_property
     def _variants(self) -> dict[tuple[Any, ...], "Interface"]:
         return {}
@@ -254,7 +259,7 @@ class Interface:
         """The FMU in a message on a name that it does not have."""
         if not self.ambiguous:
             return self.path.name
-        return f"{self.path.name}, where several are called {choices(self.ambiguous)},"
+        return f"{self.file_name}, where several are called {choices(self.ambiguous)},"
 
 
 def _common_name(flag: str) -> str:

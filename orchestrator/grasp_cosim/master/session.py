@@ -31,7 +31,7 @@ from ..system.description import System, as_system
 from ..system.overrides import as_overrides
 from ..system.parts import Component, Port, Realtime, as_signal
 from ..system.times import TimeInput, in_seconds
-from ..twins.twins import needed_twins
+from ..twins.twins import twins_of_run
 from .engine import Engine
 from .fault_windows import NO_CUTS, Cut
 from .master import Master
@@ -136,7 +136,7 @@ class Session:
             SimulationError: An FMU fails as it is initialised, or a limit is exceeded at the start.
         """
         system = as_system(system, "simulate").with_experiment(step, stop, scheme, diverging)
-        system = _to_load(system.as_steered() if steered else system)
+        system = with_twins(system.as_steered() if steered else system)
         _check_count("every", every)
         self.system = system
         self._record = RunRecord(system, metrics, every, bool(realtime))
@@ -632,12 +632,12 @@ class Session:
         )
 
 
-def _to_load(system: System) -> System:
-    """The system with its FMUs as their files are now, and native twins where only these run."""
+def with_twins(system: System) -> System:
+    """The system with its FMUs as their files are now, and the native twins that run."""
     if not all(component.is_current for component in system.components):
         components = tuple(replace(component) for component in system.components)
         system = replace(system, components=components)
-    return system.with_natives(needed_twins(system))
+    return system.with_natives(twins_of_run(system))
 
 
 def _differs_in_values_alone(system: System, running: System) -> bool:

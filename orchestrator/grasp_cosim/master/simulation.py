@@ -13,11 +13,11 @@ from ..base.progress import DELAY, Progress, phase
 from ..exchange.listener import Listener
 from ..metrics.metric import Function, Metric
 from ..recording.result import Result
-from ..system.description import System
+from ..system.description import System, as_system
 from ..system.parts import Realtime
 from ..system.times import TimeInput, in_seconds
 from .engine import Engine
-from .session import Finish, Session, State
+from .session import Finish, Session, State, with_twins
 
 __all__ = ["Session", "State", "simulate"]
 
@@ -120,6 +120,9 @@ def simulate(
     if until is not None and not callable(until):
         raise InputError(f"until = {until!r}: must be a function of the session")
     results: list[Result] = []
+    system = as_system(system, "simulate")
+    with Progress("compiling native FMUs, once for these sources", unit="", shown=bool(progress)):
+        system = with_twins(system)
 
     def keep(result: Result, error: SimulationError | None) -> None:
         results.append(result)

@@ -146,7 +146,10 @@ class RunFolder:
                 self._write_settings(result)
 
     def _write_settings(self, result: RecordedRun) -> None:
-        replace(result, origin=self._origin).to_json(self._place / SETTINGS)
+        origin = dict(self._origin)
+        if result.components:
+            origin["fmus"] = fmus_of(result.components)
+        replace(result, origin=origin).to_json(self._place / SETTINGS)
 
     def _write(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         if not self._signals:
@@ -238,6 +241,19 @@ def origin(components: Sequence[Component], command: Sequence[str]) -> dict[str,
     """The date now, the versions of what makes the run, which FMUs those are, and the command."""
     from importlib.metadata import version
 
+    return {
+        "date": now().isoformat(timespec="seconds"),
+        "versions": {
+            "python": platform.python_version(),
+            **{name: version(name) for name in ("grasp-cosim", "numpy", "fmpy")},
+        },
+        "fmus": fmus_of(components),
+        "command": list(command),
+    }
+
+
+def fmus_of(components: Sequence[Component]) -> dict[str, dict[str, Any]]:
+    """Which FMUs run, by component."""
     fmus = {
         c.name: {"guid": c.loaded.guid, "tool": c.loaded.tool, "sha256": _hash(c.loaded.path)}
         for c in components
@@ -245,15 +261,7 @@ def origin(components: Sequence[Component], command: Sequence[str]) -> dict[str,
     for c in components:
         if c.native:  # the FMU whose place it takes
             fmus[c.name]["native_twin_of"] = c.interface.guid
-    return {
-        "date": now().isoformat(timespec="seconds"),
-        "versions": {
-            "python": platform.python_version(),
-            **{name: version(name) for name in ("grasp-cosim", "numpy", "fmpy")},
-        },
-        "fmus": fmus,
-        "command": list(command),
-    }
+    return fmus
 
 
 def _hash(path: Path) -> str | None:

@@ -121,6 +121,7 @@ def replaced(
         component,
         fmu=fmu,
         native=None,
+        as_named=False,
         code=None,
         rename=names,
         units={**remaining_units, **units},

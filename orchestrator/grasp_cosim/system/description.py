@@ -433,8 +433,8 @@ class System(Structure):
 
         Args:
             native: None takes the twins that there are or that can be built here; other FMUs run as
-                they are, which the logger says. True demands those of our blocks. False runs all
-                FMUs as they are named.
+                they are, which the logger says. So does a run for which nothing was chosen. True
+                demands those of our blocks. False runs all FMUs as they are named.
 
         Returns:
             The changed system.
@@ -455,7 +455,10 @@ class System(Structure):
             The changed system, or itself where nothing changes.
         """
         components = tuple(
-            replace(c, native=natives.get(c.name, c.native)) for c in self.components
+            replace(c, native=natives[c.name], as_named=natives[c.name] is None)
+            if c.name in natives
+            else c
+            for c in self.components
         )
         return self if components == self.components else replace(self, components=components)
 

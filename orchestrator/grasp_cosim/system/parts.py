@@ -7,7 +7,7 @@ import operator
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -93,8 +93,9 @@ class Component:
     of structural parameters say. rename maps the system's name of a variable to the FMU's; all else
     goes by the system's. step_ns is its own communication step, None for the system's. units are of
     variables that the FMU declares without one, or wrongly. native is the FMU that runs in the
-    place of fmu, its twin with the same bits. With a solver the equations of an FMU that is for
-    model exchange, too, are integrated here, though it may have its own co-simulation. With
+    place of fmu, its twin with the same bits; as_named says that fmu itself is to run. Where
+    neither is given a run takes the twin that there is. With a solver the equations of an FMU that
+    is for model exchange, too, are integrated here, though it may have its own co-simulation. With
     code there is no FMU: fmu is what that is called. trace is the file that each call of the FMU is
     written to.
     """
@@ -107,6 +108,7 @@ class Component:
     isolation: Isolation = "none"
     units: Mapping[str, str] = field(default_factory=dict)
     native: Path | None = None
+    as_named: bool = False
     solver: Solver | None = None
     logging: Logging = False
     code: PythonCode | None = None
@@ -132,10 +134,15 @@ class Component:
 
     @cached_property
     def loaded(self) -> Interface:
-        """The interface of the FMU that runs: of its native twin, where it has one."""
-        return (
-            replace(self, fmu=self.native, native=None).interface if self.native else self.interface
-        )
+        """The interface of the FMU that runs: of its native twin, where it has one.
+
+        Messages name that by the FMU whose place it takes.
+        """
+        if self.native is None:
+            return self.interface
+        twin = replace(self, fmu=self.native, native=None).interface
+        named = partial(replace, twin, user_path=self.fmu)
+        return twin.variant(("user_path", self.fmu), named)
 
     @property
     def is_proxy(self) -> bool:

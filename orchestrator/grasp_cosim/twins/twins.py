@@ -32,25 +32,41 @@ class Twins(NamedTuple):
 
 
 def natives(system: Structure, native: bool | None) -> dict[str, Path | None]:
-    """The native twins by component that run in the place of FMUs: see System.natively()."""
+    """The native twins by component that run in the place of FMUs: see System.natively().
+
+    None stands for an FMU that runs itself.
+    """
     if native is False:
         _check_python_runs(system.components)
         return {c.name: None for c in system.components}
-    without_native = [c for c in system.components if not c.native]
-    twins, failure = _twins(without_native)
-    if native and failure:
+    return _chosen([c for c in system.components if not c.native], bool(native))
+
+
+def twins_of_run(system: Structure) -> dict[str, Path | None]:
+    """The same for a run, of components for which nothing is chosen, or whose FMU cannot run here.
+
+    That is an FMU in Python without a binary for this machine.
+    """
+    open_choice = [
+        c for c in system.components if not c.native and (not c.as_named or c.needs_native)
+    ]
+    return _chosen(open_choice, requested=False) if open_choice else {}
+
+
+def _chosen(components: Sequence[Component], requested: bool) -> dict[str, Path | None]:
+    """The twins of components, None where there is none of an FMU in Python.
+
+    InputError where they are requested, and cannot be built.
+    """
+    twins, failure = _twins(components)
+    if requested and failure:
         raise InputError(f"native FMUs cannot be built: {failure}")
+    in_python = [c for c in components if c.interface.python and c.name not in twins]
     if failure:
         LOGGER.warning("FMUs run in Python, which takes longer: %s", failure)
     else:
-        in_python = [c for c in without_native if c.interface.python and c.name not in twins]
-        _log_what_stays(in_python, bool(native))
-    return {**twins}
-
-
-def needed_twins(system: Structure) -> dict[str, Path | None]:
-    """The twins of FMUs in Python that have no binary for this machine, by component."""
-    return {**_twins([c for c in system.components if c.needs_native]).by_component}
+        _log_what_stays(in_python, requested)
+    return {**{c.name: None for c in in_python}, **twins}
 
 
 def _check_python_runs(components: Iterable[Component]) -> None:
