@@ -120,13 +120,14 @@ def test_a_run_has_the_same_bytes(command, preset, scheme):
     [
         (False, (), True),
         (False, ("--python",), False),
-        (True, (), False),
+        (True, (), True),
+        (True, ("--python",), False),
         (True, ("--native",), True),
     ],
     ids=str,
 )
 def test_which_fmus_run_where_nothing_is_said_of_it(command, fmus, file, option, native):
-    """Those that a file names; of the built-in grasp, of which nobody named any, native ones."""
+    """Native ones, of a file as of the built-in grasp."""
     system = (system_file(Path("a_system"), fmus / "GripperPlant.fmu", fmus),) if file else ()
     assert command("run", *system, *SHORT, *option, "--out", "a")[::2] == (0, "")
     assert ran("a").keys() == {"plant", "sensor_1", "sensor_2", "controller"}

@@ -14,8 +14,8 @@ ROOT = Path(__file__).parents[2]
 SPEED = (ROOT / "docs/results/speed.md").read_text("utf-8")
 ENGINES = (ROOT / "docs/explanation/engines.md").read_text("utf-8")
 BENCHMARKS = (ROOT / "benchmarks/README.md").read_text("utf-8")
-NO_MEASUREMENTS = {"worker", "mutants"}
-"""Modules of benchmarks/: one serves another, one is for contributors."""
+NO_MEASUREMENTS = {"worker", "bare", "mutants"}
+"""Modules of benchmarks/: two serve another, one is for contributors."""
 
 
 def test_each_benchmark_is_listed_and_there():

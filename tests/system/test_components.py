@@ -1,6 +1,8 @@
 """A component: units that a system file names, its solver, its native twin with the same bits."""
 
+import json
 import logging
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +10,8 @@ import pytest
 from comparison.made import PLANT, write_fmu
 from grasp_cosim import InputError, System, grasp_system, simulate
 from grasp_cosim.base.si_units import Unit
+from grasp_cosim.comparison.qualify import prepare_swap
+from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.grasp.system import with_controller
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.interface.renaming import in_units
@@ -237,6 +241,53 @@ def test_the_built_in_grasp_runs_natively(law):
     assert natives(python) == set()
     ours, theirs = (simulate(s, step=1e-3, stop=0.2) for s in (native, python))
     assert all(np.array_equal(ours[name], theirs[name]) for name in theirs)
+
+
+@pytest.fixture
+def file(tmp_path, fmus):
+    """The built-in grasp as a file, with a plant whose name is not that of its block."""
+    shutil.copy(fmus / "GripperPlant.fmu", tmp_path / "my_plant.fmu")
+    for name in ("ProximitySensor", "GraspController"):
+        shutil.copy(fmus / f"{name}.fmu", tmp_path)
+    path = tmp_path / "my.toml"
+    path.write_text(SYSTEM.read_text("utf-8").replace("GripperPlant.fmu", "my_plant.fmu"), "utf-8")
+    return path
+
+
+@needs_compiler
+def test_a_file_runs_natively_in_each_way_in_which_it_can_run(file):
+    short = {"step": 1e-3, "stop": 0.2}
+    result = simulate(file, **short)
+    assert natives(result) == {"plant", "sensor_1", "sensor_2", "controller"}
+    with simulate.session(file, **short) as session:
+        session.step(200)
+        assert natives(session.system) == natives(result)
+        session.reset({"plant.object_width": 0.06})
+    python = simulate(System.load(file).natively(False), **short)
+    assert natives(python) == set()
+    assert {n: c.tobytes() for n, c in python.items()} == {
+        n: c.tobytes() for n, c in result.items()
+    }
+    result.save(file.parent / "run")
+    fmus = json.loads((file.parent / "run" / "run.json").read_text())["fmus"]
+    guids = {c.name: c.interface.guid for c in python.components}
+    assert {name: fmu["native_twin_of"] for name, fmu in fmus.items()} == guids
+
+
+@needs_compiler
+def test_a_refusal_names_the_fmu_that_the_file_names(file):
+    wide = System.load(file).with_values({"plant.object_width": 0.5})
+    for system in (wide, wide.natively(False)):
+        with pytest.raises(InputError, match=r"^plant: my_plant\.fmu refused its init.* = 0\.5 m"):
+            simulate(system, stop=0.1)
+
+
+@needs_compiler
+def test_a_candidate_is_judged_itself(file):
+    """Not a twin of it, which would run in its place."""
+    swap = prepare_swap(System.load(file), "plant", file.parent / "my_plant.fmu", {}, {}, "none")
+    result = simulate(swap.swapped, step=1e-3, stop=0.01)
+    assert natives(result) == {"sensor_1", "sensor_2", "controller"}
 
 
 @needs_compiler

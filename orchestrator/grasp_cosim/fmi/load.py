@@ -11,6 +11,16 @@ from .process import ProcessInstance
 from .python_code import CodeInstance
 
 
+def is_reset_exactly(component: Component) -> bool:
+    """True for a native twin here, which after a reset is as it was when it was loaded."""
+    return (
+        component.native is not None
+        and component.loaded.version == "2.0"
+        and component.isolation == "none"
+        and not (component.trace or component.logging)
+    )
+
+
 def load(component: Component) -> Instance:
     """The instance of a component, in its own process where it wants one.
 

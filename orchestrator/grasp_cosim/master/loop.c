@@ -300,15 +300,15 @@ static void note_warning(double *warned, double time) {
     warned[0] += 1.0;
 }
 
-/* Do one operation in step k; 0, or the status that ends the loop. */
-static int operate(const Plan *plan, const Operation *operation, int64_t k, const TimeGrid *grid,
-                   const Shared *shared) {
+/* Do one operation in step k, which begins at a time in s; 0, or the status that ends the loop. */
+static int operate(const Plan *plan, const Operation *operation, int64_t k, double time,
+                   const TimeGrid *grid, const Shared *shared) {
     double *values = plan->values;
     int64_t i, begin = operation->first, end = operation->last;
 
     switch (operation->kind) {
     case STEP:
-        plan->clock[0] = point(grid, k + 1 - operation->period);
+        plan->clock[0] = operation->period == 1 ? time : point(grid, k + 1 - operation->period);
         /* fall through */
     case CALL: {
         int status = invoke(&plan->calls[begin], plan->clock, shared);
@@ -361,12 +361,15 @@ int64_t run(const Plan *plan, double *rows, int64_t room, int64_t row, int64_t o
             int64_t start, int64_t stop, int64_t grid_start, int64_t grid_step,
             int64_t per_second, Shared *shared) {
     const TimeGrid grid = {grid_start, grid_step, (double)per_second};
+    double time, end = point(&grid, start);
     int64_t k;
 
     shared->operation = shared->status = 0;
     for (k = start; k < stop; k++) {
+        time = end;
+        end = point(&grid, k + 1);
         plan->clock[1] = (double)k;
-        plan->clock[2] = point(&grid, k + 1);
+        plan->clock[2] = end;
         if (k - __atomic_load_n(&shared->taken, __ATOMIC_ACQUIRE) >= room) {
             shared->operation = operation;
             shared->status = FULL;
@@ -375,7 +378,7 @@ int64_t run(const Plan *plan, double *rows, int64_t room, int64_t row, int64_t o
         for (; operation < plan->size; operation++) {
             const Operation *o = &plan->operations[operation];
             if (o->period == 1 || k % o->period == o->phase) {
-                int status = operate(plan, o, k, &grid, shared);
+                int status = operate(plan, o, k, time, &grid, shared);
                 if (status) {
                     shared->operation = operation;
                     shared->status = status;

@@ -89,7 +89,7 @@ class Master:
         """The times in s at which the loop was initialised again."""
         self.peers: dict[str, dict[str, str]] = {}
         """The name and the build of the peer of each proxy."""
-        self._receive, self._engine, self._renew_instances = receive, engine, renew
+        self._receive, self.engine, self._renew_instances = receive, engine, renew
         self._grid = system.time_grid
         self._earlier_warnings: list[str] = []
         """Those of instances that were closed as the loop was initialised again."""
@@ -147,7 +147,7 @@ class Master:
         self.plan = planner.plan()
         # In real time the loop is compiled where it can be, however short the run is.
         steps = None if self._pacer else self.total_steps
-        self._loop = make_loop(self.plan, self._engine, steps)
+        self._loop = make_loop(self.plan, self.engine, steps)
         # By the clock rows may be handed on while the loop goes on, and finds more.
         self.bounds.compared = isinstance(self._loop, CompiledLoop) and not self._pacer
 

@@ -25,6 +25,11 @@ class RunLog:
         self._note = note
         self.describe(system)
 
+    @property
+    def is_told(self) -> bool:
+        """True if somebody gets the lines."""
+        return self._note is not None
+
     def describe(self, system: System) -> None:
         """Begin with what is known of a system. Its notes are known to whoever made the system."""
         self._remarks = (

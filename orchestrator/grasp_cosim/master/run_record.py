@@ -37,7 +37,7 @@ class RunRecord:
         in_real_time: bool,
     ) -> None:
         """Choose the metrics. InputError, before any FMU is loaded, where they cannot be had."""
-        self._system, self._every = system, every
+        self._system, self.every = system, every
         self.metrics = chosen(metrics, system.metrics, system.observed_names, system.roles)
         """The metrics of this run in addition to those of the system."""
         self._all_metrics = metrics_of(system.metrics, self.metrics)
@@ -62,7 +62,7 @@ class RunRecord:
         """Begin the listeners; slots, texts and bounds are those of the master."""
         receivers = (self._memory, *listeners)
         self.dispatcher = Dispatcher(
-            self._system, slots, receivers, self._every, texts, self._every_row, bounds
+            self._system, slots, receivers, self.every, texts, self._every_row, bounds
         )
         self._at_start = self.saved()
 
@@ -83,6 +83,15 @@ class RunRecord:
         self._memory.restore(saved[1])
         if self._every_row:
             self._every_row.restore(saved[2])
+
+    def has_metrics(self, metrics: Sequence[Metric | Function | str]) -> bool:
+        """Return True if a record with these metrics in addition would have the same ones."""
+        system = self._system
+        more = chosen(metrics, system.metrics, system.observed_names, system.roles)
+        all_metrics = metrics_of(system.metrics, more)
+        return len(all_metrics) == len(self._all_metrics) and all(
+            new is old for new, old in zip(all_metrics, self._all_metrics, strict=True)
+        )
 
     def restart(self) -> None:
         """Go back to before the first row."""

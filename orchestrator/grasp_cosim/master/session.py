@@ -104,6 +104,7 @@ class Session:
         note: Callable[[str], None] | None = None,
         finish: Finish | None = None,
         cuts: Mapping[Port, Cut] = NO_CUTS,
+        halt: threading.Event | None = None,
         steered: bool = True,
     ) -> None:
         """Load the FMUs of a system and initialise them.
@@ -128,6 +129,7 @@ class Session:
                 terminated and freed.
             cuts: Functions by the connected input at which each opens a loop. A cut gets each value
                 that the connection brings, and returns the one that is passed on in its place.
+            halt: The event that is then the attribute of this name.
             steered: Says that set() may be called, so that inputs without a source are recorded by
                 default.
 
@@ -148,8 +150,10 @@ class Session:
         self._initialised = False
         self._closed = False
         self._fmus_leave_process_alone = False
-        self.halt = threading.Event()
-        """Set, it ends the waiting of a run in real time, at a communication point."""
+        self.halt = halt or threading.Event()
+        """Set, it ends a run of simulate(), or the wait of one in real time, at a communication
+        point.
+        """
         pacing = system.realtime if realtime is True else realtime
         self.pacer = Pacer(system, pacing, self.halt.is_set) if pacing else None
         self._privileges = Privileges()
@@ -558,7 +562,7 @@ class Session:
         """
         system = self.system.with_values(values) if values else self.system
         check_groups(system)  # refuses before any FMU is called
-        if not _differs_in_values_alone(system, self.system):
+        if not differs_in_values_alone(system, self.system):
             raise InputError(
                 f"reset: {', '.join(values)}: must be start values that change no size of an array"
             )
@@ -566,14 +570,18 @@ class Session:
 
     def _initialise_anew(self, system: System) -> None:
         """Reset all FMUs and initialise them with the start values of the system."""
+        self._initialise_with(system)
+        with suppress(InputError):  # an FMU that does not give its state is reset each time
+            self._start = self.master.saved(), self._record.saved()
+
+    def _initialise_with(self, system: System) -> None:
+        """As _initialise_anew(), without a state to go back to."""
         self._failed = True
         self.master.reset(system)
         self._record.restart()
         self._take_start_values(system)
         self.master.initialise()
         self._failed = False
-        with suppress(InputError):  # an FMU that does not give its state is reset each time
-            self._start = self.master.saved(), self._record.saved()
 
     def _take_start_values(self, system: System) -> None:
         """Be a session of the system with these start values from now on."""
@@ -640,14 +648,21 @@ def with_twins(system: System) -> System:
     return system.with_natives(twins_of_run(system))
 
 
-def _differs_in_values_alone(system: System, running: System) -> bool:
+def differs_in_values_alone(system: System, running: System) -> bool:
     """True if two systems differ at most in values, so that the FMUs that are loaded fit both."""
-    for name in (f.name for f in fields(system)):
-        new, old = getattr(system, name), getattr(running, name)
-        if name != "components" and new is not old and new != old:
-            return False
-    pairs = zip(system.components, running.components, strict=True)
-    return all(new.loaded is old.loaded for new, old in pairs)
+    if not _are_alike(system, running, but="components"):
+        return False
+    new_ones, old_ones = system.components, running.components
+    return len(new_ones) == len(old_ones) and all(
+        new is old or (new.loaded is old.loaded and _are_alike(new, old, but="values"))
+        for new, old in zip(new_ones, old_ones, strict=True)
+    )
+
+
+def _are_alike(new: System | Component, old: System | Component, but: str) -> bool:
+    """True if all attributes are equal but one."""
+    pairs = ((getattr(new, f.name), getattr(old, f.name)) for f in fields(new) if f.name != but)
+    return all(a is b or a == b for a, b in pairs)
 
 
 def _description(component: Component) -> str:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import ParamSpec, Protocol, TypeVar, cast
 
@@ -16,7 +18,9 @@ from ..recording.result import Result
 from ..system.description import System, as_system
 from ..system.parts import Realtime
 from ..system.times import TimeInput, in_seconds
+from . import idle_sessions
 from .engine import Engine
+from .idle_sessions import RepeatableSession
 from .session import Finish, Session, State, with_twins
 
 __all__ = ["Session", "State", "simulate"]
@@ -66,6 +70,7 @@ def simulate(
     note: Callable[[str], None] | None = None,
     finish: Finish | None = None,
     until: Until | None = None,
+    halt: threading.Event | None = None,
 ) -> Result:
     """Run a system to its stop time, and return what was recorded at its communication points.
 
@@ -99,6 +104,8 @@ def simulate(
         until: Gets the session at each communication point and returns True where the run is to
             end. Then ended_at of the result is that time, and the log has a line. A limit in the
             system file does the same for a condition that is known before, in the loop itself.
+        halt: Set by another thread, it ends the run at a communication point, in good order. The
+            result is then not complete.
 
     Returns:
         The result with signals of the shape (rows,) by name, in the units of their FMUs, on
@@ -120,7 +127,7 @@ def simulate(
     if until is not None and not callable(until):
         raise InputError(f"until = {until!r}: must be a function of the session")
     results: list[Result] = []
-    system = as_system(system, "simulate")
+    system = as_system(system, "simulate").with_experiment(step, stop, scheme, diverging)
     with Progress("compiling native FMUs, once for these sources", unit="", shown=bool(progress)):
         system = with_twins(system)
 
@@ -129,26 +136,32 @@ def simulate(
         if finish is not None:
             finish(result, error)
 
+    def fits(session: RepeatableSession) -> bool:
+        return session.is_for(system, every, engine, metrics)
+
+    idle = None if listeners or realtime or note or until else idle_sessions.take(fits)
     try:
-        with (
-            Session(
+        with ExitStack() as stack:
+            session = idle or RepeatableSession(
                 system,
-                step=step,
-                stop=stop,
-                scheme=scheme,
                 every=every,
                 listeners=listeners,
                 engine=engine,
                 realtime=realtime,
                 metrics=metrics,
-                diverging=diverging,
                 note=note,
                 finish=keep,
+                halt=halt,
                 steered=False,
-            ) as session,
-            phase(f"{session.system.name} to {in_seconds(session.system.stop_ns):g} s"),
-        ):
-            _run_to_end(session, progress, until)
+            )
+            stack.callback(session.close)
+            if idle:
+                idle.repeat(system, keep, halt)
+            with phase(f"{session.system.name} to {in_seconds(session.system.stop_ns):g} s"):
+                _run_to_end(session, progress, until)
+            if until is None and session.rest():
+                stack.pop_all()
+                idle_sessions.keep(session)
     except KeyboardInterrupt as interrupt:
         if not results:
             raise

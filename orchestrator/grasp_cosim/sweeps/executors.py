@@ -1,8 +1,9 @@
 """Where the runs of a sweep are done: threads or processes here, or an executor of any kind.
 
-Threads take few runs of native FMUs made here, which cannot end the process: no process is started,
-and what a script or a notebook defines is there. All else goes to processes: a crash takes its own
-run only, and the part of a run that holds Python's lock, some 10 ms, is done side by side.
+Threads take runs of native FMUs made here, which cannot end the process: no process is started,
+and what a script or a notebook defines is there. The loop does not hold Python's lock, but the rest
+of a run does, so that many threads would wait for one another. All else goes to processes: a crash
+takes its own run only.
 """
 
 from __future__ import annotations
@@ -17,13 +18,9 @@ from functools import partial, wraps
 from itertools import islice
 from typing import Any, TypeVar
 
-import numpy as np
-import numpy.typing as npt
-
 from ..base.checks import extra_module
 from ..base.errors import InputError, SimulationError
 from ..base.parallel import Crew, Lost
-from ..exchange.listener import Experiment, Signal
 from ..metrics.metric import Function, Signals, check_portable
 from ..recording.memory import writing
 from .run import Job, Packed, Task, packed, run_packed, run_row, run_there
@@ -31,6 +28,9 @@ from .table import Outcome
 
 MAX_RUNS_IN_THREADS = 100
 """Runs that threads do: about so many take as long as processes take to start."""
+
+MAX_THREADS = 4
+"""Threads that do any number of runs: of a run of 3 s they hold Python's lock for a tenth."""
 
 MAX_PENDING = 100
 """Runs that an executor is given before others have ended."""
@@ -52,7 +52,8 @@ def on_this_machine(task: Task, jobs: Sequence[Job], workers: int | None) -> Out
     InputError where processes are needed, and a metric cannot go to one.
     """
     count = min(workers or os.cpu_count() or 1, len(jobs))
-    if len(jobs) <= MAX_RUNS_IN_THREADS and may_be_threads(task, jobs):
+    few = len(jobs) <= MAX_RUNS_IN_THREADS or count <= MAX_THREADS
+    if few and may_be_threads(task, jobs):
         return in_threads(task, jobs, count)
     check_portable(task.metrics)
     return in_processes(task, jobs, count)
@@ -72,34 +73,16 @@ def in_threads(task: Task, jobs: Sequence[Job], count: int) -> Outcomes:
 
     Functions of the user's are called one at a time, as they are in a process.
     """
-    halting, lock = _Halting(), threading.Lock()
+    halt, lock = threading.Event(), threading.Lock()
     serialised = tuple(replace(m, function=one_by_one(m.function, lock)) for m in task.metrics)
-    run = partial(run_row, replace(task, metrics=serialised), listeners=(halting,))
+    run = partial(run_row, replace(task, metrics=serialised), halt=halt)
     with ThreadPoolExecutor(max(count, 1), "sweep") as pool:
         try:
             for _, outcome in _results(pool, lambda job: run(*job), jobs):
                 assert outcome is not None  # noqa: S101 - threads are not lost
                 yield outcome
         finally:
-            halting.halted.set()
-
-
-class _Halting:
-    """A listener that ends its run, between two blocks, once it is halted."""
-
-    def __init__(self) -> None:
-        self.halted = threading.Event()
-
-    def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
-        """Nothing is to be prepared."""
-
-    def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
-        """KeyboardInterrupt once it is halted."""
-        if self.halted.is_set():
-            raise KeyboardInterrupt
-
-    def end(self, complete: bool) -> None:
-        """Nothing is left to do."""
+            halt.set()
 
 
 def one_by_one(function: Function, lock: threading.Lock) -> Function:

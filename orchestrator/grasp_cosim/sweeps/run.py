@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import pickle
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,7 +16,6 @@ from ..base.errors import InputError, SimulationError
 from ..base.parallel import deliver
 from ..base.pickles import as_bytes
 from ..base.scratch import ScratchFolder
-from ..exchange.listener import Listener
 from ..master.simulation import simulate
 from ..metrics.groups import Group, register_group, script_groups
 from ..metrics.metric import Metric
@@ -45,7 +44,7 @@ class Task:
     groups: Mapping[str, Group] = field(default_factory=dict)
 
 
-def run_row(task: Task, index: int, row: Row, listeners: Sequence[Listener] = ()) -> Outcome:
+def run_row(task: Task, index: int, row: Row, halt: threading.Event | None = None) -> Outcome:
     """Run a row; one that fails is an outcome, too. KeyboardInterrupt where it was interrupted.
 
     The outcome is delivered before the FMUs are ended, which may take the process along. Where its
@@ -63,7 +62,9 @@ def run_row(task: Task, index: int, row: Row, listeners: Sequence[Listener] = ()
 
     try:
         system = with_row(task.system, row)
-        result = simulate(system, metrics=task.metrics, listeners=listeners, finish=finish)
+        result = simulate(system, metrics=task.metrics, finish=finish, halt=halt)
+        if halt and halt.is_set():
+            raise KeyboardInterrupt
         return Outcome(index, result.measured.flat(), ended_at=result.ended_at)
     except (InputError, SimulationError) as error:
         return Outcome(index, {}, str(error))
@@ -129,7 +130,8 @@ def _unpack(shared: Packed) -> tuple[Task, ScratchFolder | None]:
         path = Path(folder.name, str(i), component.fmu.name)
         path.parent.mkdir()
         path.write_bytes(content)
-        components.append(replace(component, fmu=path, native=None))
+        twin = path if component.native else None
+        components.append(replace(component, fmu=path, native=twin))
     system = replace(task.system, components=tuple(components))
     signals = replace(task.signals, folder=Path(folder.name, "signals")) if task.signals else None
     return replace(task, system=system, signals=signals), folder

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -454,13 +455,9 @@ class System(Structure):
         Returns:
             The changed system, or itself where nothing changes.
         """
-        components = tuple(
-            replace(c, native=natives[c.name], as_named=natives[c.name] is None)
-            if c.name in natives
-            else c
-            for c in self.components
-        )
-        return self if components == self.components else replace(self, components=components)
+        components = tuple(_with_native(c, natives) for c in self.components)
+        changed = any(map(operator.is_not, components, self.components))
+        return replace(self, components=components) if changed else self
 
     def with_experiment(
         self,
@@ -500,6 +497,15 @@ class System(Structure):
         vars(copy).update(vars(self), components=components)
         vars(copy).pop("by_name", None)  # which has the components of self
         return copy
+
+
+def _with_native(component: Component, natives: Mapping[str, Path | None]) -> Component:
+    """The component with its twin, or None for the FMU itself; as it is where it is not named."""
+    native = natives.get(component.name, component.native)
+    as_named = component.as_named if component.name not in natives else native is None
+    if (native, as_named) == (component.native, component.as_named):
+        return component
+    return replace(component, native=native, as_named=as_named)
 
 
 def as_system(system: Any, who: str) -> System:

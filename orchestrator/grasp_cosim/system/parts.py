@@ -108,7 +108,7 @@ class Component:
     isolation: Isolation = "none"
     units: Mapping[str, str] = field(default_factory=dict)
     native: Path | None = None
-    as_named: bool = False
+    as_named: bool = field(default=False, compare=False)
     solver: Solver | None = None
     logging: Logging = False
     code: PythonCode | None = None
