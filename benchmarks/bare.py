@@ -1,6 +1,6 @@
 """The limit of a master: the blocks of the grasp as one C program, without FMI and without checks.
 
-A block of a native FMU is a header, block.h. Here each is compiled as it is, and a loop of plain C
+A block of a native FMU is a header, block.h. Each block is compiled as it is. A loop of plain C
 calls the blocks, copies values from one to the next, and writes a row of all outputs. The compiler
 sees all of it at once. The signals have the bits of a run with the Jacobi scheme.
 """

@@ -1,27 +1,36 @@
 """What a macro step of the grasp costs in grasp-cosim and in other masters, in one run.
 
     grasp-cosim build --native
-    python -m benchmarks.masters [--cofmupy-python PYTHON] [--native FOLDER] [--only CASE]
+    python -m benchmarks.masters [--cofmupy-python PYTHON] [--before PYTHON] [--native FOLDER]
+        [--only CASE]
 
 Runs the loop of four instances and ten connections at 10 kHz with the Jacobi scheme, and records
-everything. The masters take turns in chunks, with our Python FMUs and with our native ones. Prints
-the tables of README.md. A master that is not installed is skipped by name; cofmupy pins an FMPy and
-a matplotlib, so it may be in its own environment."""
+everything. The masters take turns in chunks, with our Python FMUs and with our native ones. With
+native ones the limit is there, too: the same blocks as one program of plain C. Then come a sweep
+against its bare loops, and the start of a command against that of numpy. Prints the tables of
+README.md. A master that is not installed is skipped by name; cofmupy pins an FMPy and a matplotlib,
+so it may be in its own environment, as an earlier grasp-cosim must be."""
 
 import argparse
 import os
+import resource
 import statistics
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from grasp_cosim import System, simulate, sweep
 from grasp_cosim.base.system_calls import cpus
 from grasp_cosim.fmu_export.build import build
+from grasp_cosim.grasp.presets import SYSTEM
+
+from .bare import bare_program
 
 WORKER = Path(__file__).parent / "worker.py"
 
@@ -60,9 +69,14 @@ class Master(NamedTuple):
     recorded: str
 
 
+BARE, UNRECORDED, BEFORE = "bare C", "grasp-cosim unrecorded", "grasp-cosim before"
+
 MASTERS = {
+    BARE: Master("grasp_cosim", "21 outputs in memory, no checks, no FMI"),
+    UNRECORDED: Master("grasp_cosim", "nothing, but every row is checked"),
     "grasp-cosim compiled": Master("grasp_cosim", "21 outputs in memory"),
     "grasp-cosim python": Master("grasp_cosim", "21 outputs in memory"),
+    BEFORE: Master("grasp_cosim", "21 outputs in memory"),
     "ecospy": Master("ecospy", "21 outputs, its CSV writer"),
     "libcosimpy": Master("libcosimpy", "19 real outputs in memory, its time series observer"),
     "cofmupy": Master("cofmupy", "19 real outputs in memory, its results"),
@@ -94,11 +108,16 @@ one another: there one core can be faster than two, and a long chunk slower than
 """
 
 
-def pythons(cofmupy_python: str | None) -> dict[str, str]:
-    """The interpreter of each master that can be run; says which cannot."""
+def pythons(others: Mapping[str, str | None]) -> dict[str, str]:
+    """The interpreter of each master that can be run; says which cannot.
+
+    `others` are those that need not be this one, by master.
+    """
     found = {}
     for name, (module, _) in MASTERS.items():
-        python = cofmupy_python if name == "cofmupy" and cofmupy_python else sys.executable
+        python = others.get(name) or sys.executable
+        if name == BEFORE and python == sys.executable:
+            continue
         if subprocess.run([python, "-c", f"import {module}"], capture_output=True).returncode:
             print(f"{name}: skipped, {python} has no {module}", file=sys.stderr)
         else:
@@ -115,9 +134,12 @@ def measure(
     """
     environment = {**os.environ, "TMPDIR": str(scratch)}
     core = [str(cpus()[-1])] if case.one_core else []
+    only_native = (BARE, UNRECORDED)
     with ExitStack() as stack:
         workers = {}
         for name, python in masters.items():
+            if case.fmus != "native" and name in only_native:
+                continue
             command = [python, str(WORKER), name, str(folder), *core]
             worker = Program(*command, stderr=subprocess.DEVNULL, env=environment)
             stack.enter_context(worker)
@@ -144,13 +166,85 @@ def report(title: str, times: dict[str, list[float]]) -> None:
     mood.
     """
     ours = times[REFERENCE]
-    print(f"\n| {title} | best | median | worst | times ours | best / our best | recorded |")
+    bare = times.get(BARE)
+    print(f"\n| {title} | best | median | worst | times ours | times bare C | recorded |")
     print("|---" * 7 + "|", flush=True)
     for name, chunks in times.items():
-        ratio = statistics.median(t / own for t, own in zip(chunks, ours, strict=True))
         costs = [f"{of(chunks):.2f} us" for of in (min, statistics.median, max)]
-        cells = name, *costs, f"{ratio:.1f}", f"{min(chunks) / min(ours):.1f}"
+        of_bare = f"{ratio(chunks, bare):.2f}" if bare else ""
+        cells = name, *costs, f"{ratio(chunks, ours):.2f}", of_bare
         print("|", " | ".join([*cells, MASTERS[name].recorded]), "|", flush=True)
+    if bare:
+        shares = {
+            "models": ratio(bare, ours),
+            "FMI calls, copies and checks": ratio(times[UNRECORDED], ours) - ratio(bare, ours),
+            "rows to memory": 1.0 - ratio(times[UNRECORDED], ours),
+        }
+        print(*(f"{name}: {100 * share:.0f} %" for name, share in shares.items()), sep=", ")
+
+
+def ratio(times: Sequence[float], others: Sequence[float]) -> float:
+    """The median of the ratios within a turn."""
+    return statistics.median(t / other for t, other in zip(times, others, strict=True))
+
+
+def report_sweep(folder: Path, scratch: Path, runs: int = 200, rounds: int = 5) -> None:
+    """Print the processor time of a sweep of grasps of 3 s, and of one more run from Python.
+
+    The ratio is to as many bare loops, in the same turn.
+    """
+    system = System.load(SYSTEM, folder).with_experiment(step=1e-4, stop=3.0, scheme="jacobi")
+    system = system.with_natives({c.name: c.fmu for c in system.components})
+    program = bare_program(system, 1e-4, scratch)
+    rows = [{"plant.object_width": 0.06 + 1e-5 * i} for i in range(runs)]
+    short = system.with_experiment(stop=1e-3)
+    simulate(short)
+    measures = {
+        "bare loop": lambda: cpu(lambda: program.advance(system.total_steps), 20),
+        "grasp of a sweep": lambda: cpu(lambda: sweep(system, rows)) / runs,
+        "run of 10 steps and its metrics": lambda: cpu(lambda: simulate(short).measured, 50),
+    }
+    found = by_turns(measures, rounds)
+    print("\n| processor time | best | median | times the bare loop |\n|---|---|---|---|")
+    for name, times in found.items():
+        costs = [f"{1e3 * of(times):.2f} ms" for of in (min, statistics.median)]
+        print("|", " | ".join([name, *costs, f"{ratio(times, found['bare loop']):.2f}"]), "|")
+
+
+def cpu(act: Callable[[], object], times: int = 1) -> float:
+    """The processor time in s of one of so many calls, with the processes that they wait for."""
+    begin = _cpu_now()
+    for _ in range(times):
+        act()
+    return (_cpu_now() - begin) / times
+
+
+def _cpu_now() -> float:
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime
+
+
+def report_starts(rounds: int = 15) -> None:
+    """Print the time in s of commands from start to end, and the ratio to that of numpy."""
+    command = [sys.executable, "-m", "grasp_cosim"]
+    commands = {
+        "import numpy": [sys.executable, "-c", "import numpy"],
+        "grasp-cosim --version": [*command, "--version"],
+        "grasp-cosim run --stop 0.001": [*command, "run", "--stop", "0.001"],
+    }
+    environment = {n: v for n, v in os.environ.items() if n != "PYTHONDONTWRITEBYTECODE"}
+
+    def taken(arguments: Sequence[str]) -> float:
+        begin = time.perf_counter()
+        subprocess.run(arguments, env=environment, capture_output=True, check=True)
+        return time.perf_counter() - begin
+
+    measures = {name: partial(taken, arguments) for name, arguments in commands.items()}
+    found = by_turns(measures, rounds)
+    print("\n| start | best | median | times that of numpy |\n|---|---|---|---|")
+    for name, times in found.items():
+        costs = [f"{1e3 * of(times):.0f} ms" for of in (min, statistics.median)]
+        print("|", " | ".join([name, *costs, f"{ratio(times, found['import numpy']):.2f}"]), "|")
 
 
 def main() -> None:
@@ -160,12 +254,17 @@ def main() -> None:
         "--cofmupy-python", metavar="PYTHON", help="a Python that has cofmupy; default: this one"
     )
     parser.add_argument(
+        "--before", metavar="PYTHON", help="a Python that has an earlier grasp-cosim"
+    )
+    parser.add_argument(
         "--native", metavar="FOLDER", type=Path, default=Path("fmus/native"),
         help="what `grasp-cosim build --native` wrote; default: %(default)s",
     )  # fmt: skip
-    parser.add_argument("--only", choices=("python", "native"), help="FMUs to measure")
+    parser.add_argument(
+        "--only", choices=("python", "native", "sweep", "start"), help="what to measure"
+    )
     given = parser.parse_args()
-    masters = pythons(given.cofmupy_python)
+    masters = pythons({"cofmupy": given.cofmupy_python, BEFORE: given.before})
     with tempfile.TemporaryDirectory(prefix="grasp_bench_") as scratch:
         folders = {"python": Path(scratch, "python"), "native": given.native.resolve()}
         build(folders["python"])
@@ -174,6 +273,12 @@ def main() -> None:
                 print(f"{case.title}: skipped, build them with `grasp-cosim build --native`")
             elif given.only in (None, case.fmus):
                 report(case.title, measure(masters, folders[case.fmus], case, Path(scratch)))
+        if given.only in (None, "sweep"):
+            of_bare = Path(scratch, "bare")
+            of_bare.mkdir()
+            report_sweep(folders["native"], of_bare)
+        if given.only in (None, "start"):
+            report_starts()
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ of FMPy collide.
 Every master runs the Jacobi scheme, the one they share, and records every output its own way.
 """
 
+import dataclasses
 import importlib
 import os
 import sys
@@ -52,14 +53,30 @@ def descriptions(folder: Path) -> dict[str, list[Any]]:
     return {name: read(folder / f"{fmu}.fmu").modelVariables for name, fmu in COMPONENTS.items()}
 
 
-def ours(folder: Path, engine: str) -> Master:
+def ours(folder: Path, engine: str, **more: Any) -> Master:
     """grasp-cosim; every output in memory."""
+    grasp_cosim, system = _system(folder)
+    how = {"step": STEP, "stop": LONG, "scheme": "jacobi", "engine": engine, **more}
+    session = grasp_cosim.simulate.session(system, **how)
+    return Master(session.step, lambda: session["plant.position[1]"])
+
+
+def _system(folder: Path) -> tuple[Any, Any]:
+    """The package, and the grasp of the FMUs of a folder, which run as they are."""
     grasp_cosim = importlib.import_module("grasp_cosim")
     presets = importlib.import_module("grasp_cosim.grasp.presets")
     system = grasp_cosim.System.load(presets.SYSTEM, folder)
-    how = {"step": STEP, "stop": LONG, "scheme": "jacobi", "engine": engine}
-    session = grasp_cosim.simulate.session(system, **how)
-    return Master(session.step, lambda: session["plant.position[1]"])
+    if hasattr(system, "natively"):
+        system = system.natively(False)
+    return grasp_cosim, dataclasses.replace(system, metrics=())
+
+
+def bare(folder: Path) -> Master:
+    """The blocks as one program of plain C; every output in memory."""
+    _, system = _system(folder)
+    scratch = Path(tempfile.mkdtemp(dir=os.environ["TMPDIR"]))
+    program = importlib.import_module("bare").bare_program(system, STEP, scratch)
+    return Master(program.advance, lambda: program.last(1)["plant.position[1]"])
 
 
 def ecospy(folder: Path) -> Master:
@@ -158,6 +175,9 @@ def cofmupy(folder: Path) -> Master:
 
 
 MASTERS: dict[str, Callable[[Path], Master]] = {
+    "bare C": bare,
+    "grasp-cosim unrecorded": lambda folder: ours(folder, "compiled", every=10**9),
+    "grasp-cosim before": lambda folder: ours(folder, "compiled"),
     "grasp-cosim compiled": lambda folder: ours(folder, "compiled"),
     "grasp-cosim python": lambda folder: ours(folder, "python"),
     "ecospy": ecospy,

@@ -39,7 +39,7 @@ class Bounds:
             columns: The columns.
             magnitudes: The bounds. Where one is 0 that is any other value than 0, and where it is
                 inf or nan, it is inf and nan.
-            infinite: Where this is True, inf alone is below a bound of inf or nan.
+            infinite: True where inf itself is no reason to look, only nan.
         """
         bits = np.where(magnitudes == 0.0, 5e-324, magnitudes).view(np.int64)
         self.magnitudes[columns] = np.minimum(bits, INFINITY + np.asarray(infinite, np.int64))
