@@ -60,8 +60,11 @@ class Lenient:
         if function not in self._functions:  # type: ignore[attr-defined]
             raise MissingFunctionError(function)
         messages_before = self.messages.count
-        call = partial(super()._call, function)  # type: ignore[misc]
-        answer = self.trace.call(function, call, arguments) if self.trace else call(*arguments)
+        if self.trace:
+            call = partial(super()._call, function)  # type: ignore[misc]
+            answer = self.trace.call(function, call, arguments)
+        else:
+            answer = super()._call(function, *arguments)  # type: ignore[misc]
         has_status = self._functions[function].restype is ctypes.c_int  # type: ignore[attr-defined]
         if has_status and answer == WARNING:
             self.messages.returned(function, messages_before)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..base.errors import InputError, SimulationError, nearest
-from ..base.progress import phase
+from ..base.progress import Progress, phase
 from ..exchange.listener import Listener
 from ..fmi.call_trace import begin_trace
 from ..fmi.instance import Instance
@@ -640,12 +640,18 @@ class Session:
         )
 
 
-def with_twins(system: System) -> System:
-    """The system with its FMUs as their files are now, and the native twins that run."""
+def with_twins(system: System, progress: bool = False) -> System:
+    """The system with its FMUs as their files are now, and the native twins that run.
+
+    With progress standard error shows that they are compiled.
+    """
     if not all(component.is_current for component in system.components):
         components = tuple(replace(component) for component in system.components)
         system = replace(system, components=components)
-    return system.with_natives(twins_of_run(system))
+    if all(component.is_chosen for component in system.components):
+        return system
+    with Progress("compiling native FMUs, once for these sources", unit="", shown=progress):
+        return system.with_natives(twins_of_run(system))
 
 
 def differs_in_values_alone(system: System, running: System) -> bool:

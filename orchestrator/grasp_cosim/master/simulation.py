@@ -128,8 +128,7 @@ def simulate(
         raise InputError(f"until = {until!r}: must be a function of the session")
     results: list[Result] = []
     system = as_system(system, "simulate").with_experiment(step, stop, scheme, diverging)
-    with Progress("compiling native FMUs, once for these sources", unit="", shown=bool(progress)):
-        system = with_twins(system)
+    system = with_twins(system, bool(progress))
 
     def keep(result: Result, error: SimulationError | None) -> None:
         results.append(result)

@@ -13,6 +13,7 @@ import sys
 import traceback
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import count
 from math import isfinite
 from pathlib import Path
@@ -476,9 +477,18 @@ def _with_reasons(
     metrics: Iterable[Metric], names: Collection[str], roles: Mapping[str, str]
 ) -> MetricsWithReasons:
     """The metrics of as many elements as there are, and why signals of these `names` lack them."""
-    sized = [m.of(names, roles) for m in metrics]
+    return _judged(tuple(metrics), tuple(names), tuple(roles.items()))
+
+
+@lru_cache(maxsize=16)
+def _judged(
+    metrics: tuple[Metric, ...], names: tuple[str, ...], roles: tuple[tuple[str, str], ...]
+) -> MetricsWithReasons:
+    """As _with_reasons(); a thousand runs of one system ask it once."""
+    known, component_of = frozenset(names), dict(roles)
+    sized = [m.of(known, component_of) for m in metrics]
     every = [need for m in sized for need in m.needs]
-    return [(m, lacking(m.needs, names, roles, every)) for m in sized]
+    return tuple((m, lacking(m.needs, known, component_of, every)) for m in sized)
 
 
 def _together(lost: Sequence[Metric], judged: MetricsWithReasons) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, fields, replace
 from fractions import Fraction
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 from ..base.checks import choice, number, whole
 from ..base.errors import InputError
@@ -188,6 +188,13 @@ class Component:
         return self.code.content if self.code else self.fmu.read_bytes()
 
     @property
+    def is_chosen(self) -> bool:
+        """True if nothing is open as to which FMU runs: there is but one, or it was chosen."""
+        if self.native is not None or not self._read[0].python:
+            return True
+        return self.as_named and not self.needs_native
+
+    @property
     def needs_native(self) -> bool:
         """True if no native twin is chosen, and the FMU is in Python, without a binary for here."""
         fmu = self._read[0]
@@ -205,8 +212,7 @@ class Component:
         return expanded(interface, lengths)
 
 
-@dataclass(frozen=True, slots=True)
-class Port:
+class Port(NamedTuple):
     """A variable of a component; without one, an input or output of the system itself."""
 
     component: str

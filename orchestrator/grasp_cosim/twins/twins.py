@@ -47,10 +47,7 @@ def twins_of_run(system: Structure) -> dict[str, Path | None]:
 
     That is an FMU in Python without a binary for this machine.
     """
-    open_choice = [
-        c for c in system.components if not c.native and (not c.as_named or c.needs_native)
-    ]
-    return _chosen(open_choice, requested=False) if open_choice else {}
+    return _chosen([c for c in system.components if not c.is_chosen], requested=False)
 
 
 def _chosen(components: Sequence[Component], requested: bool) -> dict[str, Path | None]:
