@@ -9,6 +9,7 @@ from tempfile import gettempdir
 
 import click
 
+from ..base.collector import without_collector
 from ..base.errors import InputError, nearest
 from ..base.scratch import sweep
 from .frame import EVERYWHERE, logging_at
@@ -68,9 +69,9 @@ class Commands(click.Group):
         """The command of that name; None where there is none."""
         if name not in MODULE_OF_COMMAND:
             return None
-        command: click.Command = getattr(
-            import_module(f"{__package__}.{MODULE_OF_COMMAND[name]}"), name
-        )
+        with without_collector():
+            module = import_module(f"{__package__}.{MODULE_OF_COMMAND[name]}")
+        command: click.Command = getattr(module, name)
         command.params += [option for option in EVERYWHERE if option not in command.params]
         return command
 

@@ -7,8 +7,6 @@ from ..interface.interface import Interface
 from ..system.parts import Component, Logging, Solver
 from .co_simulation import Fmi3Instance, FmuInstance, SharedInstance
 from .instance import Instance
-from .process import ProcessInstance
-from .python_code import CodeInstance
 
 
 def is_reset_exactly(component: Component) -> bool:
@@ -28,8 +26,12 @@ def load(component: Component) -> Instance:
     """
     name, interface = component.name, component.loaded
     if component.code:
+        from .python_code import CodeInstance  # only here, as below: few components need it
+
         return CodeInstance(name, component.code)
     if component.isolation == "process":
+        from .process import ProcessInstance
+
         solver, logging = component.solver, component.logging
         return ProcessInstance(name, interface, solver, logging, component.trace)
     if component.native and interface.version == "2.0":

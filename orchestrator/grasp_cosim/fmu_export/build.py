@@ -269,7 +269,14 @@ def sources_key() -> str:
     for source in (*map(package_folder, PACKAGES), *SOURCES):
         files += _below(source) if source.is_dir() else [source]
     versions = sorted(name for name in os.listdir(site.parent) if name.startswith(VERSIONS))  # noqa: PTH208
-    contents = (part for f in files if f.is_file() for part in (f.name, f.read_bytes()))
+    states = ((f, f.stat()) for f in files if f.is_file())
+    return _key_of(tuple(versions), tuple((f, s.st_size, s.st_mtime_ns) for f, s in states))
+
+
+@functools.lru_cache(maxsize=1)
+def _key_of(versions: tuple[str, ...], files: tuple[tuple[Path, int, int], ...]) -> str:
+    """Return the key of files as they are: the Python FMUs of a run and their twins ask for it."""
+    contents = (part for f, *_ in files for part in (f.name, f.read_bytes()))
     return cache.key((sys.version, *versions, *contents))
 
 

@@ -189,6 +189,20 @@ def unpacker(fields: list[Field]) -> Callable[[Any], list[Any]]:
     return _compiled(f"(y): ({items}) = y; return [{scalars}]")
 
 
+def stepper(block: Block, fields: list[Field]) -> Callable[[Any, Any, Any, float], Any]:
+    """A function from Params, State, Inputs and h to the next State, the list of the scalars of
+    the Outputs then, and their sum: compiled like packer().
+    """
+    items, scalars = _shape(fields, "output", "y{}")
+    total = scalars.replace(",", " +")
+    return _compiled(
+        f"(p, x, u, h): x = step(p, x, u, h); ({items}) = outputs(p, x, u); "
+        f"return x, [{scalars}], {total} 0.0",
+        step=block.step,
+        outputs=block.outputs,
+    )
+
+
 def _shape(fields: list[Field], causality: Causality, name: str) -> tuple[str, str]:
     """Names for the scalars of a causality, numbered: in the shape of the fields, and in a row."""
     items, number = "", count()
@@ -200,9 +214,9 @@ def _shape(fields: list[Field], causality: Causality, name: str) -> tuple[str, s
     return items, "".join(f"{name.format(i)}, " for i in range(next(number)))
 
 
-def _compiled(definition: str, **names: Any) -> Callable[[Any], Any]:
+def _compiled(definition: str, **names: Any) -> Callable[..., Any]:
     exec(f"def function{definition}", names)  # noqa: S102 - written here, from the shape only
-    function: Callable[[Any], Any] = names["function"]
+    function: Callable[..., Any] = names["function"]
     return function
 
 

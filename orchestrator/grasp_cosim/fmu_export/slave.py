@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache
 from math import inf, isclose, isfinite
+from operator import itemgetter
 from typing import Any, NamedTuple, NoReturn, TypeVar, cast
 from weakref import ref
 
@@ -53,15 +54,25 @@ def _shape(block: contract.Block) -> tuple[list[contract.Field], list[Variable],
     """
     fields = contract.declared(block)
     pack, unpack = contract.packer(block.Inputs, fields), contract.unpacker(fields)
-    functions = block.step, block.outputs, pack, contract.input_check(block), unpack
+    step = contract.stepper(block, fields)
+    functions = step, block.outputs, pack, contract.input_check(block), unpack
     return fields, contract.variables(fields), functions
 
+
+_Read = tuple[list[int], bool, slice | None, Callable[[list[Any]], Any]]
+"""References, whether outputs are among them, where they are if in a row, what picks their values.
+"""
+
+_Set = tuple[list[int], slice | None]
+"""References of inputs, and where they are if in a row."""
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 
 def reported(call: _F) -> _F:
-    """The call, with what it raises reported."""
+    """The call, with what it raises reported. The calls of a step report it themselves, as a
+    wrapper would take time.
+    """
 
     def reporting(self: "Slave", *arguments: Any) -> Any:
         try:
@@ -72,39 +83,47 @@ def reported(call: _F) -> _F:
     return cast(_F, reporting)
 
 
+def _row(vrs: list[int]) -> slice | None:
+    """Where references are that are in a row, as those of a host mostly are; else None."""
+    row = slice(vrs[0], vrs[-1] + 1) if vrs else slice(0, 0)
+    return row if vrs == [*range(row.start, row.stop)] else None
+
+
 def _getter(kind: type[Scalar]) -> Callable[["Slave", list[int]], list[Any]]:
-    @reported
     def get(self: "Slave", vrs: list[int]) -> list[Any]:
         """Values of the given references."""
-        if vrs != self._last_read.get(kind):
-            self._check_kind(vrs, kind)
-            self._last_read[kind] = [*vrs]
-        if self._inputs is None and not self._output_vrs.isdisjoint(vrs):
-            self._refresh()
-        return [self._values[vr] for vr in vrs]
+        try:
+            known, of_outputs, row, picked = self._last_read[kind]
+            if vrs != known:
+                _, of_outputs, row, picked = self._reading(vrs, kind)
+            if of_outputs and self._inputs is None:
+                self._refresh()
+            return self._values[row] if row else [*picked(self._values)]
+        except BaseException as error:
+            self._report(error)
 
     return get
 
 
 def _setter(kind: type[Scalar]) -> Callable[["Slave", list[int], list[Any]], None]:
-    @reported
+    real = kind is float
+
     def set_(self: "Slave", vrs: list[int], values: list[Any]) -> None:
         """Set inputs or parameters, all or none; outputs follow when they are next asked for."""
-        only_inputs = vrs == self._last_set.get(kind)
-        if not only_inputs:
-            self._check_kind(vrs, kind)
-            self._check_settable(vrs)
-            only_inputs = max(vrs, default=0) < self._first_parameter
-            if only_inputs:
-                self._last_set[kind] = [*vrs]
-        if not only_inputs or (kind is float and not isfinite(sum(values))):
-            for vr, value in zip(vrs, values, strict=True):
-                self._variables[vr].check(value)
-        for vr, value in zip(vrs, values, strict=True):
-            self._values[vr] = value
-        if not only_inputs:
-            self._params = None
-        self._inputs = None
+        try:
+            known, row = self._last_set[kind]
+            if vrs != known:
+                row = self._row_to_set(vrs, kind, values)
+            elif real and not isfinite(sum(values)):
+                self._check_values(vrs, values)
+            if row:
+                self._values[row] = values
+            else:
+                for vr, value in zip(vrs, values, strict=True):
+                    self._values[vr] = value
+            self._inputs = None
+        except BaseException as error:
+            self._report(error)
 
     return set_
 
@@ -125,7 +144,7 @@ class Slave:
         self._outputs = slice(first, self._first_parameter)
         self._output_vrs = frozenset(range(first, self._first_parameter))
         self._settable = [vr for vr, _ in enumerate(causalities) if vr not in self._output_vrs]
-        self._longest_step = contract.longest_step(self._block)
+        self._longest_step = min(contract.longest_step(self._block), sys.float_info.max)
         self._values = [v.start for v in self._variables]
         self._state = self._block.initial_state(self._block.Params(), self._block.Inputs())
         self._enter(INSTANTIATED)
@@ -133,8 +152,10 @@ class Slave:
     def _enter(self, phase: int) -> None:
         self._phase = phase
         # The host nearly always asks for the same again, and sets the same inputs
-        self._last_read: dict[type[Scalar], list[int]] = {}
-        self._last_set: dict[type[Scalar], list[int]] = {}
+        nothing_read: _Read = [], False, slice(0, 0), tuple
+        nothing_set: _Set = [], slice(0, 0)
+        self._last_read = dict.fromkeys(TYPES, nothing_read)
+        self._last_set = dict.fromkeys(TYPES, nothing_set)
 
     # The life cycle
 
@@ -164,38 +185,38 @@ class Slave:
         """The end; values can still be read."""
         self._enter(TERMINATED)
 
-    @reported
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Advance the block by step_size seconds with the inputs as they are.
 
         Where it cannot, it raises: to discard a step is for pythonfmu to end the simulation.
         """
-        self._require("fmi2DoStep", STEPPING)
-        if not 0.0 < step_size < inf:
-            raise ValueError(f"step size = {step_size} s: must be a finite number above 0")
-        late = abs(current_time - self._time)
-        if not (late <= TIME_TOLERANCE or isclose(current_time, self._time, rel_tol=1e-12)):
-            raise ValueError(f"step from {current_time} s: must be from {self._time} s")
-        if step_size > self._longest_step:
-            raise ValueError(f"step of {step_size} s: must be at most {self._longest_step:g} s")
-        step, outputs, pack, check, unpack = self._functions
-        params = self._read_params()
-        inputs = self._inputs
-        if inputs is None:
-            inputs = self._inputs = pack(self._values)
-            if check:
-                check(params, inputs)
         try:
-            state = step(params, self._state, inputs, step_size)
-            values = unpack(outputs(params, state, inputs))
-            if not isfinite(sum(values)):
-                self._check_finite(values)
-        except REASONS as error:
-            raise ArithmeticError(f"step of {step_size} s: {error}") from error
-        self._state = state
-        self._values[self._outputs] = values
-        self._time = current_time + step_size
-        return True
+            if not (
+                self._phase == STEPPING
+                and 0.0 < step_size <= self._longest_step
+                and abs(current_time - self._time) <= TIME_TOLERANCE
+            ):
+                self._check_step(current_time, step_size)
+            step, _, pack, check, _ = self._functions
+            params, inputs = self._params, self._inputs
+            if params is None:
+                params = self._read_params()
+            if inputs is None:
+                inputs = self._inputs = pack(self._values)
+                if check:
+                    check(params, inputs)
+            try:
+                state, values, total = step(params, self._state, inputs, step_size)
+                if not isfinite(total):
+                    self._check_finite(values)
+            except REASONS as error:
+                raise ArithmeticError(f"step of {step_size} s: {error}") from error
+            self._state = state
+            self._values[self._outputs] = values
+            self._time = current_time + step_size
+            return True
+        except BaseException as error:
+            self._report(error)
 
     # Values
 
@@ -220,6 +241,16 @@ class Slave:
         if self._phase != phase:
             raise ValueError(f"{call} {PHASES[self._phase]}: must be {PHASES[phase]}")
 
+    def _check_step(self, current_time: float, step_size: float) -> None:
+        self._require("fmi2DoStep", STEPPING)
+        if not 0.0 < step_size < inf:
+            raise ValueError(f"step size = {step_size} s: must be a finite number above 0")
+        late = abs(current_time - self._time)
+        if not (late <= TIME_TOLERANCE or isclose(current_time, self._time, rel_tol=1e-12)):
+            raise ValueError(f"step from {current_time} s: must be from {self._time} s")
+        if step_size > self._longest_step:
+            raise ValueError(f"step of {step_size} s: must be at most {self._longest_step:g} s")
+
     def _check_settable(self, vrs: list[int]) -> None:
         for v in (self._variables[vr] for vr in vrs):
             if v.causality == "output":
@@ -229,6 +260,30 @@ class Slave:
             if self._phase == STEPPING and v.variability == "fixed":
                 must = "must be before fmi2ExitInitializationMode"
                 raise ValueError(f"{v.name}: fixed parameter set in step mode: {must}")
+
+    def _reading(self, vrs: list[int], kind: type[Scalar]) -> _Read:
+        """Check what is to be read, and return how."""
+        self._check_kind(vrs, kind)
+        of_outputs = not self._output_vrs.isdisjoint(vrs)
+        reading = [*vrs], of_outputs, _row(vrs), itemgetter(*(vrs or [0]))
+        self._last_read[kind] = reading
+        return reading
+
+    def _row_to_set(self, vrs: list[int], kind: type[Scalar], values: list[Any]) -> slice | None:
+        """Check all that is to be set; where it goes, None if that is not in a row."""
+        self._check_kind(vrs, kind)
+        self._check_settable(vrs)
+        self._check_values(vrs, values)
+        row = _row(vrs)
+        if max(vrs, default=0) < self._first_parameter:
+            self._last_set[kind] = [*vrs], row
+        else:
+            self._params = None
+        return row
+
+    def _check_values(self, vrs: list[int], values: list[Any]) -> None:
+        for vr, value in zip(vrs, values, strict=True):
+            self._variables[vr].check(value)
 
     def _check_finite(self, values: list[float]) -> None:
         pairs = zip(self._variables[self._outputs], values, strict=True)
