@@ -1,6 +1,8 @@
 """A run of FMUs that are loaded already is as the first one, in all but the time it takes."""
 
+import os
 import threading
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -162,3 +164,16 @@ def test_a_run_that_is_halted_ends_in_good_order(native, made):
     halt.clear()
     assert simulate(native, halt=halt).complete
     assert len(made) == 3
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="NO fork on this system")
+@pytest.mark.filterwarnings("ignore:.*multi-threaded.*:DeprecationWarning")
+def test_a_fork_loads_its_own_fmus(native):
+    """Those of its parent would end it, with 0: see end_fork()."""
+    expected = all_of(simulate(native))
+    child = os.fork()
+    if not child:
+        with suppress(BaseException):
+            os._exit(7 if all_of(simulate(native)) == expected else 1)
+        os._exit(2)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7

@@ -4,6 +4,7 @@ To load four FMUs and plan their steps takes longer than many a run. Only FMUs t
 exactly are kept so: native twins of our own blocks.
 """
 
+import os
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -84,6 +85,17 @@ _idle: list[RepeatableSession] = []
 """The one that ended last comes last."""
 
 _LOCK = threading.Lock()
+
+
+def _forget() -> None:
+    """Forget them in a fork: what they have loaded is the parent's, and so may the lock be."""
+    global _LOCK
+    _LOCK = threading.Lock()
+    _idle.clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget)
 
 
 def take(fits: Callable[[RepeatableSession], bool]) -> RepeatableSession | None:
