@@ -4,6 +4,7 @@ import errno
 import os
 import stat
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from threading import Thread
 
 import pytest
@@ -57,6 +58,16 @@ def test_a_link_stays_and_what_it_names_is_replaced(tmp_path, there):
     assert file.read_text() == "after"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["folder", "link"]
     assert [p.name for p in file.parent.iterdir()] == ["file"]
+
+
+@pytest.mark.skipif(not os.access("/dev/shm", os.W_OK), reason="there is no folder in memory")
+def test_a_file_in_memory_is_replaced():
+    with TemporaryDirectory(dir="/dev/shm") as folder:
+        file = Path(folder, "file")
+        write(file, "before")
+        write(file, "after")
+        assert file.read_text() == "after"
+        assert not is_stream(file)
 
 
 def test_whoever_reads_a_pipe_gets_what_is_written(tmp_path):

@@ -13,12 +13,17 @@ from tempfile import TemporaryDirectory
 NO_FILES = ("dev", "proc")
 """The folders at the top of a system in which nothing is a file that may be replaced."""
 
+OF_FILES = ("dev", "shm")
+"""The folder in one of these that has ordinary files, which are kept in memory."""
+
 
 def is_stream(path: Path) -> bool:
     """Return True for a device, a pipe or the like, also behind a link: it is written into."""
     if path.is_dir() or not path.exists():
         return False
-    return not path.is_file() or bool({*path.absolute().parts[1:2]} & {*NO_FILES})
+    parts = path.absolute().parts
+    among_devices = parts[1:2] in [(name,) for name in NO_FILES] and parts[1:3] != OF_FILES
+    return not path.is_file() or among_devices
 
 
 @contextmanager

@@ -7,7 +7,7 @@ The schemes, components with a longer step and time: docs/explanation/co_simulat
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -196,20 +196,22 @@ class Master:
 
     def warnings(self) -> list[str]:
         """Lines for the log on what the FMUs warned of, in the order of the components."""
-        lines = [*self._earlier_warnings]
+        lines, returned = [*self._earlier_warnings], self._warned_calls()
         for instance in self.instances:
-            returned = list(self._warned_calls(instance))
-            total = sum(int(count) for count, _ in returned)
-            first = min((time for _, time in returned), default=0.0)
+            calls = returned.get(instance.name, [])
+            total = sum(int(count) for count, _ in calls)
+            first = min((time for _, time in calls), default=0.0)
             lines += instance.remarks(total, first)
         return lines
 
-    def _warned_calls(self, instance: Instance) -> Iterator[tuple[float, float]]:
-        """The warnings that calls of an instance returned: how many, and the time of the first."""
+    def _warned_calls(self) -> dict[str, list[tuple[float, float]]]:
+        """The warnings that calls returned, by instance: how many, and the time of the first."""
+        calls: dict[str, list[tuple[float, float]]] = {}
         warned = self.plan.warned.reshape(-1, 2).tolist()
         for owner, (count, first) in zip(self.plan.owners, warned, strict=True):
-            if owner is instance and count:
-                yield count, first
+            if owner is not None and count:
+                calls.setdefault(owner.name, []).append((count, first))
+        return calls
 
     def advance(self, steps: int) -> int:
         """Do the given number of steps, or fewer where the stop time is nearer; how many it were.
