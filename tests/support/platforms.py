@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from grasp_cosim.base.c_compilers import Compiler, compile_all
+from grasp_cosim.base.c_compilers import LEVEL, Compiler, compile_all
 from grasp_cosim.fmu_export.build import compiler_for, job
 from grasp_cosim.fmu_export.native.targets import LINUX_ARM, LINUX_X86, WINDOWS, Target, this_target
 
@@ -38,7 +38,7 @@ class Platform:
     name: str
     compiler: tuple[str, ...]
     target: Target = LINUX_X86
-    level: str = "-O2"
+    level: str = LEVEL
     same_bits: bool = True
     """Its libm is the one that Python uses."""
     mark: Any = ()
@@ -53,7 +53,7 @@ class Platform:
             library.write_bytes(made.read_bytes())
             return library
         line = job(fmu.name, {}, self.target, Compiler(self.compiler)).command
-        command = [self.level if word == "-O2" else word for word in line]
+        command = [self.level if word == LEVEL else word for word in line]
         done = subprocess.run(
             [*command, "-o", str(library)],
             cwd=fmu.folder / "sources", capture_output=True, text=True,

@@ -300,7 +300,8 @@ def test_a_system_of_others_is_none_of_our_business(tmp_path, caplog):
 
 @needs_compiler
 @pytest.mark.usefixtures("no_compiler")
-def test_without_a_compiler_they_run_in_python_unless_asked(grasp, caplog):
+def test_without_a_compiler_they_run_in_python_unless_asked(grasp, caplog, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # where no native ones of the user's are
     assert natives(grasp.natively()) == set()
     ((_, level, said),) = caplog.record_tuples
     assert level == logging.WARNING

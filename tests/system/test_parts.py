@@ -1,7 +1,6 @@
 """The parts of a system refuse what is out of range, in one line that says what is valid."""
 
 import math
-from dataclasses import FrozenInstanceError
 from fractions import Fraction
 from pathlib import Path
 
@@ -92,8 +91,8 @@ def test_what_is_not_said_is_as_the_pages_say():
 )  # fmt: skip
 def test_a_part_cannot_be_changed(part):
     """Systems share them."""
-    (name, *_) = part.__dataclass_fields__
-    with pytest.raises(FrozenInstanceError):
+    (name, *_) = getattr(part, "_fields", None) or part.__dataclass_fields__
+    with pytest.raises(AttributeError):
         setattr(part, name, None)
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-TRANSFER_2, TRANSFER_3, STEP_2, STEP_3, PYTHON, CLOCK, PACE = range(7)
+TRANSFER_2, TRANSFER_3, STEP_2, STEP_3, PYTHON, CLOCK, PACE, READ = range(8)
 """The shapes of a call, as the compiled loop makes it: see master/loop.c."""
 
 
@@ -18,6 +18,7 @@ class Native(NamedTuple):
     for the last; no call where the end of the step is not before the time in s at the
     address limit. CLOCK: time.monotonic_ns(), less size, goes to data, a double. PACE: wait
     for the beginning of a step; instance is what realtime/pacer.py keeps for it, data its times.
+    READ: no call; size doubles are copied from the address instance to data.
     """
 
     shape: int

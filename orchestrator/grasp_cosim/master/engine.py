@@ -264,7 +264,7 @@ def _constants() -> list[str]:
     names_of = {
         loop: "COPY SCALE STORE LOAD LOAD_LONG DRIVE WATCH EXCHANGE CALL STEP TOO_LONG EXACT WORST "
         "FULL HALTED OVERRUN WATCHED STALLED",
-        shapes: "TRANSFER_2 TRANSFER_3 STEP_2 STEP_3 CLOCK PACE",
+        shapes: "TRANSFER_2 TRANSFER_3 STEP_2 STEP_3 CLOCK PACE READ",
         timing: "ARRIVED LATE SCHEDULED BEGIN",
     }
     shared = {

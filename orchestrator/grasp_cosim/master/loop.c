@@ -183,6 +183,9 @@ static int invoke(const Call *call, const double *clock, const Shared *shared) {
         if (status > WORST) return status;
         if (said[0] && !said[1]) return EVENT;
         return said[1] || said[2] ? EARLY : status;
+    case READ:
+        memcpy(call->data, call->instance, (size_t)call->size * sizeof(double));
+        return 0;
     case CLOCK:
         *(double *)call->data = (double)(monotonic() - call->size);
         return 0;

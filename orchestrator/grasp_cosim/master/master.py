@@ -38,7 +38,7 @@ from .start import Starter
 from .step_completion import TO_BE_FINISHED, finish_step, with_failures_beside
 from .watches import Watches
 
-CHUNK = 4096
+CHUNK = 1024
 """The most steps between two times that rows are handed on."""
 
 MAX_BYTES = 1 << 26

@@ -36,7 +36,10 @@ LIBM = (
 )  # fmt: skip
 """Functions whose calls no compiler may work out by itself: it rounds otherwise than libm."""
 
-BITS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
+LEVEL = "-O3"
+"""How much compilers optimise, which leaves the bits as they are."""
+
+BITS = ("-std=c99", LEVEL, "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
 """What decides the bits, in addition to -fno-builtin-NAME for the functions in LIBM.
 
 The last two leave them as they are: nobody reads errno, nor the flags of exceptions.
