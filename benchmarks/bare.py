@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import NamedTuple
 from zipfile import ZipFile
 
+import numpy as np
+import numpy.typing as npt
 from grasp_cosim import System
 from grasp_cosim.base.c_compilers import BITS, LIBM, find_compiler
 from grasp_cosim.interface.variables import Variable
@@ -62,7 +64,7 @@ LOOP = """\
 #include <string.h>
 
 {declared}
-static double inputs[{n_inputs}], outputs[{n_outputs}], *rows;
+static double inputs[{n_inputs}], outputs[{n_outputs}];
 static void *models[{n_models}];
 
 static void pass(void) {{
@@ -78,10 +80,8 @@ void start(void) {{
     }}
 }}
 
-double *advance(long steps) {{
-    double *row;
-    free(rows);
-    row = rows = malloc((size_t)steps * sizeof outputs);
+double *advance(long steps, double *rows) {{
+    double *row = rows;
     for (; steps > 0; steps--, row += {n_outputs}) {{
         pass();
 {stepped}
@@ -98,16 +98,11 @@ class Program(NamedTuple):
     library: ctypes.CDLL
     outputs: Sequence[str]
 
-    def advance(self, steps: int) -> None:
-        """Do so many steps; their rows take the place of earlier ones."""
-        self.library.advance(steps)
-
-    def last(self, steps: int) -> dict[str, float]:
-        """The outputs after so many more steps."""
-        self.library.advance.restype = ctypes.POINTER(ctypes.c_double)
-        first = (steps - 1) * len(self.outputs)
-        row = self.library.advance(steps)[first : first + len(self.outputs)]
-        return dict(zip(self.outputs, row, strict=True))
+    def advance(self, steps: int) -> npt.NDArray[np.float64]:
+        """Do so many steps; their rows, in memory that is new to the process if they are many."""
+        rows = np.empty((steps, len(self.outputs)))
+        self.library.advance(steps, rows.ctypes.data)
+        return rows
 
 
 def bare_program(system: System, step: float, folder: Path) -> Program:
@@ -139,7 +134,7 @@ def _compiled(folder: Path) -> ctypes.CDLL:
     linked = (*find_compiler().command, *flags, "-shared", *objects, "-lm", "-o", str(library))
     subprocess.run(linked, check=True)
     loaded = ctypes.CDLL(str(library))
-    loaded.advance.argtypes = [ctypes.c_long]
+    loaded.advance.argtypes = [ctypes.c_long, ctypes.c_void_p]
     loaded.start()
     return loaded
 

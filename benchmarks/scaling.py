@@ -4,12 +4,12 @@
 
 TMPDIR=/dev/shm keeps the files in memory, so that the times are not those of a disk.
 
-Each part at each size has its own process, which prepares what the part needs and measures it
-after a small one of its kind. Memory is the growth of the peak of the process meanwhile. Rows are
-those of the native grasp at 1 kHz, signals the outputs of one FMU, components a chain of FMUs with
-one input and one output. Times are of the processor, which others that run on the machine change
-less; standard error has those of the wall clock, too. The exponent is that of the time as a power
-of the size.
+Each part at each size has its own process, which prepares what the part needs and measures it after
+a small one of its kind. Memory is the growth of the peak of the process meanwhile. Rows are those
+of the native grasp at 1 kHz, and signals are the outputs of one FMU. Components are a chain of FMUs
+with one input and one output. Times are of the processor, which others that run on the machine
+change less; standard error has those of the wall clock, too. The exponent is that of the time as a
+power of the size.
 """
 
 import argparse
@@ -285,7 +285,7 @@ DIMENSIONS = {
 def peak() -> int:
     """The most bytes that this process has had since `forget_peak()`."""
     if sys.platform == "win32":
-        raise SystemExit("benchmarks.scaling: needs Linux, which tells the peak of the memory")
+        raise SystemExit("benchmarks.scaling: needs Linux, where /proc has the peak of the memory")
     return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 

@@ -16,10 +16,10 @@ from ..system.description import System
 from .engine import Engine
 from .session import Finish, Session, differs_in_values_alone
 
-MAX_IDLE = 8
+MAX_IDLE = 4
 """Sessions that are kept, of which threads run one each."""
 
-MAX_BYTES = 1 << 26
+MAX_BYTES = 1 << 25
 """Of the rows of a run whose session is kept."""
 
 
@@ -55,10 +55,11 @@ class RepeatableSession(Session):
         """
         self._finish, self._wall_time = finish, 0.0
         self.halt = halt or threading.Event()
+        self._record.start_over()
         self._call_fmus(partial(self._initialise_with, system))
 
     def rest(self) -> bool:
-        """Hand the result of a run over that came to its end, and forget it, with the FMUs loaded.
+        """Hand the result of a run over that came to its end, with the FMUs loaded.
 
         Returns:
             False if the session cannot be used again: it must be closed.
@@ -67,7 +68,6 @@ class RepeatableSession(Session):
             return False
         self._hand_over()
         self._finish = None
-        self._record.restart()
         return True
 
     @property

@@ -97,6 +97,14 @@ class RunRecord:
         """Go back to before the first row."""
         self.restore(self._at_start)
 
+    def start_over(self) -> None:
+        """As restart(), where no saved state needs the rows."""
+        dispatcher, _, *every_row = self._at_start
+        self.dispatcher.restore(dispatcher)
+        self._memory.start_over()
+        if self._every_row:
+            self._every_row.restore(*every_row)
+
     def take_start_values(self, system: System) -> None:
         """Describe the run by the same system with other start values from now on."""
         self._system = system

@@ -570,15 +570,15 @@ class Session:
 
     def _initialise_anew(self, system: System) -> None:
         """Reset all FMUs and initialise them with the start values of the system."""
+        self._record.restart()
         self._initialise_with(system)
         with suppress(InputError):  # an FMU that does not give its state is reset each time
             self._start = self.master.saved(), self._record.saved()
 
     def _initialise_with(self, system: System) -> None:
-        """As _initialise_anew(), without a state to go back to."""
+        """As _initialise_anew(), but for the rows, and without a state to go back to."""
         self._failed = True
         self.master.reset(system)
-        self._record.restart()
         self._take_start_values(system)
         self.master.initialise()
         self._failed = False

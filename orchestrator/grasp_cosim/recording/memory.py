@@ -1,5 +1,6 @@
 """Keeps a run in memory, as NumPy columns."""
 
+import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,6 +22,9 @@ BEYOND = 2.0**63
 
 TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.bool_}
 """The element type of a column of numbers by its signal's kind."""
+
+OWN_REFERENCES = 3
+"""To a table that only its storage has: that, a variable, and the argument of getrefcount()."""
 
 Rows = tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]
 """Steps, and their rows of values."""
@@ -120,6 +124,16 @@ class MemoryListener:
             table = np.empty_like(self._storage.medium)
             table[:, : self._rows] = self._storage.medium[:, : self._rows]
             self._storage = _Storage(table, self._rows)
+
+    def start_over(self) -> None:
+        """Give up all rows. Memory to which no result refers any more is used again.
+
+        To be given memory by the system takes as long as to fill it takes several times.
+        """
+        self._rows = 0
+        table = self._storage.medium
+        is_free = sys.getrefcount(table) == OWN_REFERENCES
+        self._storage = _Storage(table if is_free else np.empty_like(table))
 
     def columns(self, next_row: Rows | None = None) -> Columns:
         """The recorded communication points in s and the columns by name, so far.
