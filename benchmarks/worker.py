@@ -62,13 +62,18 @@ def ours(folder: Path, engine: str, **more: Any) -> Master:
 
 
 def _system(folder: Path) -> tuple[Any, Any]:
-    """The package, and the grasp of the FMUs of a folder, which run as they are."""
+    """The package, which may be an earlier one, and the grasp of the FMUs of a folder as they are.
+
+    It has no metrics, which some runs would keep every row for.
+    """
     grasp_cosim = importlib.import_module("grasp_cosim")
     presets = importlib.import_module("grasp_cosim.grasp.presets")
     system = grasp_cosim.System.load(presets.SYSTEM, folder)
     if hasattr(system, "natively"):
         system = system.natively(False)
-    return grasp_cosim, dataclasses.replace(system, metrics=())
+    if hasattr(system, "metrics"):
+        system = dataclasses.replace(system, metrics=())
+    return grasp_cosim, system
 
 
 def bare(folder: Path) -> Master:
