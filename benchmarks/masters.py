@@ -126,11 +126,12 @@ def pythons(others: Mapping[str, str | None]) -> dict[str, str]:
 
 
 def measure(
-    masters: dict[str, str], folder: Path, case: Case, scratch: Path
+    masters: dict[str, str], folders: Mapping[str, Path], case: Case, scratch: Path
 ) -> dict[str, list[float]]:
-    """Us per macro step of all masters with the FMUs of a folder, chunk by chunk alternately.
+    """Us per macro step of all masters with the FMUs of a case, chunk by chunk alternately.
 
-    What the masters leave behind goes to `scratch`.
+    `folders` has them by kind; an earlier grasp-cosim makes its own. What the masters leave behind
+    goes to `scratch`.
     """
     environment = {**os.environ, "TMPDIR": str(scratch)}
     core = [str(cpus()[-1])] if case.one_core else []
@@ -140,6 +141,9 @@ def measure(
         for name, python in masters.items():
             if case.fmus != "native" and name in only_native:
                 continue
+            folder = folders[case.fmus]
+            if name == BEFORE:
+                folder = _built_before(python, case.fmus, scratch)
             command = [python, str(WORKER), name, str(folder), *core]
             worker = Program(*command, stderr=subprocess.DEVNULL, env=environment)
             stack.enter_context(worker)
@@ -152,6 +156,15 @@ def measure(
         for name, worker in workers.items():
             print(f"{name}: finger 1 at {float(worker.ask('')):.5f} m", file=sys.stderr)
     return times
+
+
+def _built_before(python: str, kind: str, scratch: Path) -> Path:
+    """The FMUs of an earlier grasp-cosim."""
+    folder = scratch / f"{kind}_before"
+    options = ["--native"] if kind == "native" else []
+    command = [python, "-m", "grasp_cosim", "build", *options, "--out", str(folder)]
+    subprocess.run(command, capture_output=True, check=True)
+    return folder
 
 
 def chunk(worker: Program, steps: int) -> float:
@@ -272,7 +285,7 @@ def main() -> None:
             if not any(folders[case.fmus].glob("*.fmu")):
                 print(f"{case.title}: skipped, build them with `grasp-cosim build --native`")
             elif given.only in (None, case.fmus):
-                report(case.title, measure(masters, folders[case.fmus], case, Path(scratch)))
+                report(case.title, measure(masters, folders, case, Path(scratch)))
         if given.only in (None, "sweep"):
             of_bare = Path(scratch, "bare")
             of_bare.mkdir()
