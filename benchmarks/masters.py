@@ -233,6 +233,8 @@ def cpu(act: Callable[[], object], times: int = 1) -> float:
 
 
 def _cpu_now() -> float:
+    if sys.platform == "win32":
+        raise SystemExit("benchmarks.masters: needs a system that counts the time of children")
     children = resource.getrusage(resource.RUSAGE_CHILDREN)
     return time.process_time() + children.ru_utime + children.ru_stime
 

@@ -44,6 +44,14 @@ def test_without_a_magnitude_only_what_is_not_finite_is_looked_at(value, infinit
     assert exceeded([value], bounds) == bool(found)
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_value_at_its_bound_has_come_to_it(sign):
+    for value, found in ((2.0, True), (np.nextafter(2.0, 0.0), False)):
+        bounds = Bounds(1)
+        bounds.put([0], np.array([2.0]), [False])
+        assert exceeded([sign * value], bounds) == found
+
+
 def test_before_any_bound_is_put_and_where_none_is_compared_all_is_looked_at():
     bounds = Bounds(1)
     assert exceeded([0.0], bounds)

@@ -80,6 +80,20 @@ def test_what_a_result_has_stays_as_it_is(native):
     assert all_of(first) == before
 
 
+def test_memory_is_used_again_where_no_result_refers_to_it(native):
+    def place(result):
+        return result["plant.gap[1]"].ctypes.data
+
+    first = place(simulate(native))
+    column = simulate(native)["plant.gap[1]"]
+    assert column.ctypes.data == first
+    before = column.tobytes()
+    kept = simulate(wide(native, 0.05))
+    assert place(kept) != first
+    assert column.tobytes() == before
+    assert place(simulate(native)) not in (first, place(kept))
+
+
 def test_a_run_that_fails_is_not_gone_on_with(native, made):
     simulate(native)
     for _ in range(2):

@@ -9,7 +9,14 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from grasp_cosim import grasp_system, sweep
 from grasp_cosim.metrics.metric import metric
-from grasp_cosim.sweeps.executors import in_processes, in_threads, may_be_threads, one_by_one
+from grasp_cosim.sweeps import executors
+from grasp_cosim.sweeps.executors import (
+    MAX_RUNS_IN_THREADS,
+    in_processes,
+    in_threads,
+    may_be_threads,
+    one_by_one,
+)
 from grasp_cosim.sweeps.run import Task
 from support.marks import needs_compiler
 from support.native_systems import integrator
@@ -46,6 +53,18 @@ def test_only_native_fmus_made_here_run_in_threads(native, tmp_path):
     assert not may_be_threads(Task(native), [(0, {"components.plant.fmu": "x.fmu"})])
     assert not may_be_threads(Task(native.natively(False)), JOBS)
     assert not may_be_threads(Task(integrator(tmp_path)), JOBS)
+
+
+@pytest.mark.parametrize(
+    ("runs", "workers", "threads"),
+    [(MAX_RUNS_IN_THREADS, 8, True), (MAX_RUNS_IN_THREADS + 1, 8, False), (1000, 4, True)],
+)
+def test_many_threads_would_wait_for_one_another(native, monkeypatch, runs, workers, threads):
+    for of in (in_threads, in_processes):
+        monkeypatch.setattr(executors, of.__name__, lambda *a, of=of: of)
+    jobs = [(i, {}) for i in range(runs)]
+    chosen = executors.on_this_machine(Task(native), jobs, workers)
+    assert chosen is (in_threads if threads else in_processes)
 
 
 def test_functions_of_the_user_are_called_one_at_a_time():

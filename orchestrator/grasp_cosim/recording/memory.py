@@ -23,9 +23,6 @@ BEYOND = 2.0**63
 TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.bool_}
 """The element type of a column of numbers by its signal's kind."""
 
-OWN_REFERENCES = 3
-"""To a table that only its storage has: that, a variable, and the argument of getrefcount()."""
-
 Rows = tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]
 """Steps, and their rows of values."""
 
@@ -74,6 +71,14 @@ class _Storage(Generic[Medium]):
     def share(self, rows: int) -> None:
         """Have a saved state refer to the first so many rows."""
         self.shared_rows = max(self.shared_rows, rows)
+
+
+def _references(storage: _Storage[npt.NDArray[np.float64]]) -> int:
+    return sys.getrefcount(storage.medium)
+
+
+OWN_REFERENCES = _references(_Storage(np.empty(0)))
+"""To a table that nothing but its storage has; what Python adds to it differs between versions."""
 
 
 class MemoryListener:
@@ -131,8 +136,8 @@ class MemoryListener:
         To be given memory by the system takes as long as to fill it takes several times.
         """
         self._rows = 0
+        is_free = _references(self._storage) == OWN_REFERENCES
         table = self._storage.medium
-        is_free = sys.getrefcount(table) == OWN_REFERENCES
         self._storage = _Storage(table if is_free else np.empty_like(table))
 
     def columns(self, next_row: Rows | None = None) -> Columns:
