@@ -175,7 +175,10 @@ def test_one_of_other_sources_stays_as_it_is(command, altered):
     asked = ("--swap", f"plant={heavy}", *SHORT, "--native")
     code, _, err = command("run", *asked, "--out", "a")
     assert code == 0
-    assert err == "no native FMU runs as plant (GripperPlant.fmu has no native twin)\n"
+    assert err == (
+        "no native FMU runs as plant (GripperPlant.fmu is of other sources than our GripperPlant); "
+        "`grasp-cosim build` makes those of our blocks again\n"
+    )
     assert {name for name, fmu in ran("a").items() if "native_twin_of" not in fmu} == {"plant"}
 
 

@@ -77,23 +77,36 @@ def _check_python_runs(components: Iterable[Component]) -> None:
 def _log_what_stays(in_python: Sequence[Component], requested: bool) -> None:
     """Log the components that stay in Python.
 
-    It is a warning where native ones were requested, or where a user has built one that does not
-    fit.
+    It is a warning where native ones were requested, and where one may be expected: an FMU of a
+    block of ours is of other sources, or a user has built a native one that does not fit.
     """
     remarks = []
-    unexpected = requested
+    unexpected, remedy = requested, ""
     for component in in_python:
-        file = component.fmu.name
+        file, name = component.fmu.name, component.interface.identifier
         built_by_user = next((path for path in _users_twins(component) if path.is_file()), None)
         if built_by_user:
             unexpected = True
             reason = f"{built_by_user} is not the twin of this {file}, or not for this machine"
+        elif _is_shipped(component):
+            unexpected = True
+            remedy = "; `grasp-cosim build` makes those of our blocks again"
+            reason = f"{file} is of other sources than our {name}"
         else:
             reason = f"{file} has no native twin"
         remarks.append(f"{component.name} ({reason})")
     if remarks:
         level = logging.WARNING if unexpected else logging.INFO
-        LOGGER.log(level, "no native FMU runs as %s", choices(remarks, MAX_LISTED))
+        LOGGER.log(level, "no native FMU runs as %s%s", choices(remarks, MAX_LISTED), remedy)
+
+
+def _is_shipped(component: Component) -> bool:
+    """True for an FMU of the name of a block that comes with the package."""
+    if not _is_ours(component):
+        return False
+    from ..fmu_export.shipped import together
+
+    return together(component.interface.identifier) is not None
 
 
 def _missing_binary(component: Component) -> str:
