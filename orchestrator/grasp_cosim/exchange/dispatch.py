@@ -85,16 +85,10 @@ class Dispatcher:
         self._goes_on = system.diverging == "continue"
         self._may_be_infinite = np.array([self._goes_on or port in open_ended for port in watched])
         self._runaways: list[str] = []
-        by_tap = system.once(taps).items()
-        energies = [bond.signal for bond in system.once(bonds)]
-        every_column = [
-            *(_Column(signal, slots[port]) for port, signal in observed.items()),
-            *(_Column(_of_tap(n, t, texts), slots[t.source], t.change) for n, t in by_tap),
-            *(_Column(signal, len(slots) + i) for i, signal in enumerate(energies)),
-        ]
-        column_of = dict(zip(observed, every_column, strict=False))
+        column_of = {port: _Column(signal, slots[port]) for port, signal in observed.items()}
+        computed = _computed(system, slots, texts)
+        every_column = [*column_of.values(), *computed]
         recorded = [column_of[port] for port in system.recorded]
-        computed = every_column[len(observed) :]
         recorded += [c for c in computed if system.record.has(c.signal.name)]
         self._recorded = _Columns(recorded)
         self.signals = self._recorded.signals
@@ -226,17 +220,29 @@ def _signal(system: System, port: Port, texts: Mapping[Port, Texts]) -> Signal:
     )
 
 
-def _of_tap(name: str, tap: Tap, texts: Mapping[Port, Texts]) -> Signal:
-    """The signal of an output of the system itself."""
-    return Signal(name, tap.unit, tap.kind, tap.description, texts.get(tap.source, Texts()))
-
-
 class _Column(NamedTuple):
     """A signal, its column in the rows of the loop, and what converts that."""
 
     signal: Signal
     place: int
     change: Conversion = IDENTITY
+
+
+def _computed(
+    system: System, slots: Mapping[Port, int], texts: Mapping[Port, Texts]
+) -> list[_Column]:
+    """The outputs of the system itself, then the energies, whose columns are behind the slots."""
+    of_taps = [
+        _Column(_of_tap(name, tap, texts), slots[tap.source], tap.change)
+        for name, tap in system.once(taps).items()
+    ]
+    energies = [_Column(bond.signal, len(slots) + i) for i, bond in enumerate(system.once(bonds))]
+    return of_taps + energies
+
+
+def _of_tap(name: str, tap: Tap, texts: Mapping[Port, Texts]) -> Signal:
+    """The signal of an output of the system itself."""
+    return Signal(name, tap.unit, tap.kind, tap.description, texts.get(tap.source, Texts()))
 
 
 class _Columns:

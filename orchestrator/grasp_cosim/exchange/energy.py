@@ -22,8 +22,6 @@ from ..system.parts import Component, Port
 from ..system.record import ENERGY
 from .listener import Signal
 
-IDENTITY = (1.0, 0.0)
-
 
 @dataclass(frozen=True, slots=True)
 class Bond:

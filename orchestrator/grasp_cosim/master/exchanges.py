@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ..exchange.energy import IDENTITY, Bond, bonds
+from ..exchange.energy import Bond, bonds
+from ..interface.units import IDENTITY
 from ..system.description import System
 from ..system.parts import Port
 from ..system.validity import transforms
