@@ -266,7 +266,7 @@ def test_it_hangs_by_friction_as_long_as_that_suffices():
     assert y.tangential_force == pytest.approx((0.5 * demand, 0.5 * demand), rel=1e-9)
     assert y.friction_limit == pytest.approx((0.6 * HELD_BY, 0.6 * HELD_BY), rel=1e-9)
     assert y.slip == pytest.approx(0.0, abs=1e-12)
-    assert y.lift_height == pytest.approx(0.5 * 1.0 * 0.2**2, rel=1e-9)
+    assert y.fingertip_height == pytest.approx(0.5 * 1.0 * 0.2**2, rel=1e-9)
 
 
 def test_it_swings_between_the_fingers_as_three_masses_do():
@@ -317,11 +317,11 @@ def test_the_lift_begins_when_it_is_due_or_enabled():
     off = replace(LIFTED, lift=Lift(False, 0.05, 1.0, 100.0, 100.0))
     x = squeezed(due, HELD_BY)
     y = seen(due, after(due, x, (-HELD_BY, HELD_BY), 1e-3, 150))
-    assert y.lift_height == pytest.approx(0.5 * 0.1**2, rel=1e-9)
+    assert y.fingertip_height == pytest.approx(0.5 * 0.1**2, rel=1e-9)
     x = after(off, x, (-HELD_BY, HELD_BY), 1e-3, 100)
-    assert seen(off, x).load == seen(off, x).lift_height == 0.0
+    assert seen(off, x).load == seen(off, x).fingertip_height == 0.0
     y = seen(due, after(due, x, (-HELD_BY, HELD_BY), 1e-3, 100))
-    assert y.lift_height == pytest.approx(0.5 * 0.1**2, rel=1e-9)
+    assert y.fingertip_height == pytest.approx(0.5 * 0.1**2, rel=1e-9)
 
 
 def test_the_floor_holds_a_body_and_the_air_does_not():
