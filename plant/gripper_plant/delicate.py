@@ -185,7 +185,7 @@ class Outputs(NamedTuple):
         bool,
         Output("the object has slipped out, by more than half its height", depends_on=set()),
     ]
-    lift_height: Annotated[
+    fingertip_height: Annotated[
         float,
         Output(
             "height of the fingertips above where they began",

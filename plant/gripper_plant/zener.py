@@ -1,4 +1,4 @@
-"""A side that gives and relaxes: a spring k_inf beside a spring k_1 on a dashpot, never a pull.
+"""A side that gives and relaxes: a spring, parallel to a spring on a dashpot. It never pulls.
 
     F = k_inf·delta + k_1·(delta - z),  z' = (delta - z)/tau    (Z1)
 

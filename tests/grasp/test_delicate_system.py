@@ -24,7 +24,7 @@ def test_a_thing_is_grasped_and_lifted_as_far_as_friction_holds_it(system, name)
     assert None not in m["time_to_contact"]
     assert m["damaged"] is False
     assert m["dropped"] == (m["lift_margin"] < 1.0)
-    assert run.signals["plant.lift_height"][-1] == pytest.approx(0.1, abs=1e-4)
+    assert run.signals["plant.fingertip_height"][-1] == pytest.approx(0.1, abs=1e-4)
     weight = system.presets[name]["plant.object_mass"] * 9.80665
     if not m["dropped"]:
         lifted = sum(run.signals[f"plant.tangential_force[{j}]"][-1] for j in (1, 2))
@@ -40,7 +40,7 @@ def test_an_event_may_begin_the_lift(fmus, tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text(f'{text}\n{event}set = {{ "plant.lift.enabled" = true }}\n', "utf-8")
     run = simulate(System.load(file, fmus).with_presets("tomato"), stop=3.0)
-    forces, heights = run.signals["plant.contact_force[1]"], run.signals["plant.lift_height"]
+    forces, heights = run.signals["plant.contact_force[1]"], run.signals["plant.fingertip_height"]
     pressed = next(k for k, force in enumerate(forces) if force > 2.0)
     assert heights[pressed] == 0.0
     assert 0.0 < heights[pressed + 2] < 1e-4

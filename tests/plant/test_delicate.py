@@ -266,7 +266,30 @@ def test_it_hangs_by_friction_as_long_as_that_suffices():
     assert y.tangential_force == pytest.approx((0.5 * demand, 0.5 * demand), rel=1e-9)
     assert y.friction_limit == pytest.approx((0.6 * HELD_BY, 0.6 * HELD_BY), rel=1e-9)
     assert y.slip == pytest.approx(0.0, abs=1e-12)
-    assert y.lift_height == pytest.approx(0.5 * 1.0 * 0.2**2, rel=1e-9)
+    assert y.fingertip_height == pytest.approx(0.5 * 1.0 * 0.2**2, rel=1e-9)
+
+
+def test_it_swings_between_the_fingers_as_three_masses_do():
+    """In the air across, against an ODE solver: two fingers, the object, two sides that relax."""
+    p, h = replace(LIFTED, side=Side(400.0, 600.0, 0.05)), 5e-4
+    k_inf, k_1, tau = p.law
+    right, left, half = -HELD_BY + 0.4, HELD_BY + 0.2, 0.5 * p.object_width
+    x = after(p, squeezed(p, HELD_BY), (-HELD_BY, HELD_BY), h, 2)  # it hangs by then
+
+    def rates(_, y):
+        x_1, x_2, x_m, v_1, v_2, v_m, z_1, z_2 = y
+        d_1, d_2 = x_m + half - x_1, x_2 - x_m + half
+        f_1, f_2 = (k_inf * d + k_1 * (d - z) for d, z in ((d_1, z_1), (d_2, z_2)))
+        return [v_1, v_2, v_m, (right + f_1) / M, (left - f_2) / M, (f_2 - f_1) / p.object_mass,
+                (d_1 - z_1) / tau, (d_2 - z_2) / tau]  # fmt: skip
+
+    begin = (*x.position, x.object[0], *x.velocity, x.object[1], *x.dashpot)
+    end = solve_ivp(rates, (0.0, 0.15), begin, rtol=1e-10, atol=1e-13).y[:, -1]
+    x = after(p, x, (right, left), h, 300)
+    found = (*x.position, x.object[0], *x.velocity, x.object[1], *x.dashpot)
+    assert found == pytest.approx(end, abs=2e-5)
+    assert abs(x.object[0]) > 5e-3
+    assert min(x.contact_force[0], -x.contact_force[1]) > 1.0
 
 
 def test_it_slips_as_far_as_analysis_says_and_is_dropped():
@@ -294,11 +317,11 @@ def test_the_lift_begins_when_it_is_due_or_enabled():
     off = replace(LIFTED, lift=Lift(False, 0.05, 1.0, 100.0, 100.0))
     x = squeezed(due, HELD_BY)
     y = seen(due, after(due, x, (-HELD_BY, HELD_BY), 1e-3, 150))
-    assert y.lift_height == pytest.approx(0.5 * 0.1**2, rel=1e-9)
+    assert y.fingertip_height == pytest.approx(0.5 * 0.1**2, rel=1e-9)
     x = after(off, x, (-HELD_BY, HELD_BY), 1e-3, 100)
-    assert seen(off, x).load == seen(off, x).lift_height == 0.0
+    assert seen(off, x).load == seen(off, x).fingertip_height == 0.0
     y = seen(due, after(due, x, (-HELD_BY, HELD_BY), 1e-3, 100))
-    assert y.lift_height == pytest.approx(0.5 * 0.1**2, rel=1e-9)
+    assert y.fingertip_height == pytest.approx(0.5 * 0.1**2, rel=1e-9)
 
 
 def test_the_floor_holds_a_body_and_the_air_does_not():
