@@ -20,15 +20,18 @@ NEVER = -1.0
 
 
 class Touch(NamedTuple):
-    """Of one finger: impulse in N.s, first contact in s since the start (NEVER before), its speed
-    in m/s, impulse in N.s within IMPACT_WINDOW from it, touched since the last communication point.
-    """
+    """Of one finger, since the start."""
 
     impulse: float
+    """Of the contact force, N.s."""
     first_time: float
+    """Of the first contact, s; NEVER before."""
     speed: float
+    """Of the first contact, m/s."""
     impact: float
+    """Impulse within IMPACT_WINDOW from the first contact, N.s."""
     touched: bool
+    """Since the last communication point."""
 
 
 TouchPair = tuple[Touch, Touch]
