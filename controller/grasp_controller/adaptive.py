@@ -36,6 +36,7 @@ class State(NamedTuple):
     line_2: reflectance_ratio.Line
     estimate: reflectance_ratio.Estimate
     closing: float
+    lasting: float
     hold: float
 
 
@@ -58,7 +59,7 @@ def initial_state(p: Params, u: Inputs) -> State:
     floor = p.impact_reduction.intensity_floor
     line_1, line_2 = reflectance_ratio.first_points(p.reflectance, floor, u.position, u.intensity)
     estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
-    return State(series.initial_state(p, u), line_1, line_2, estimate, 0.0, 0.0)
+    return State(series.initial_state(p, u), line_1, line_2, estimate, 0.0, 0.0, 0.0)
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
@@ -66,7 +67,11 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     v_1, v_2 = u.velocity
     closing = holding.filtered(p.hold, x.closing, v_1 - v_2, h)
     u_1, u_2 = series.outputs(p, x.layers, u).force
-    hold = holding.hold(p.hold, 0.5 * u_2 - 0.5 * u_1, closing)
+    pressed = holding.pressed(p.hold, 0.5 * u_2 - 0.5 * u_1, closing)
+    lasting = holding.lasting(p.hold, x.lasting, pressed, h)
+    touching_1 = holding.touching(p.hold, p.reflectance, x.line_1, lasting)
+    touching_2 = holding.touching(p.hold, p.reflectance, x.line_2, lasting)
+    hold = pressed * (touching_1 * touching_2)  # (R9)
     floor = p.impact_reduction.intensity_floor
     free, lines = 1.0 - hold, (x.line_1, x.line_2)
     line_1, line_2 = reflectance_ratio.both_moved(
@@ -76,7 +81,7 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     alike = reflectance_ratio.alike(estimate, u.intensity)
     f_s = free * layer_3.virtual_force(p.simultaneous_contact, alike)  # Eq. (2')
     layers = series.advance(p, x.layers, u, f_s, h)
-    return State(layers, line_1, line_2, estimate, closing, hold)
+    return State(layers, line_1, line_2, estimate, closing, lasting, hold)
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:

@@ -285,10 +285,15 @@ def gaps(p: Params, white: float, line_1: Line, line_2: Line) -> Pair:
 
 def gap(p: Params, line: Line, white: float) -> float:
     """The gap in m of a finger, 1/kappa drawn towards that of a white face as it is uncertain."""
-    prior = p.prior_deviation * p.prior_deviation
-    gain = prior / (prior + line.variance) if prior > 0.0 else 0.0
+    gain = known(p, line)
     per_y = (1.0 - gain) * white + gain * line.per_y
     return line.y * per_y - p.offset_distance + line.ahead  # (R1) for the gap
+
+
+def known(p: Params, line: Line) -> float:
+    """How far the slope of a line is known, from 0 without one to 1."""
+    prior = p.prior_deviation * p.prior_deviation
+    return prior / (prior + line.variance) if prior > 0.0 else 0.0
 
 
 def _clamped(x: float, low: float, high: float) -> float:

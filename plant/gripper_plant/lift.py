@@ -7,7 +7,7 @@ Equations: plant/README.md
 """
 
 from dataclasses import dataclass
-from math import sqrt
+from math import copysign, sqrt
 from typing import Annotated, NamedTuple
 
 from block_variables import Group, Parameter
@@ -85,7 +85,7 @@ def slip(y: Height) -> float:
 def floor_force(m: float, y: Height, load: Load) -> float:
     """N in (L1), of m kg; 0 for an object that hangs."""
     t_1, t_2 = load.tangential
-    return max(0.0, m * GRAVITY - t_1 - t_2) if y.body <= 0.0 else 0.0
+    return max(0.0, m * GRAVITY - (t_1 + t_2)) if y.body <= 0.0 else 0.0
 
 
 def rise(p: Lift, y: Height, lifting: bool, d: float) -> Pair:
@@ -124,7 +124,6 @@ def carry(m: float, y: Height, tips: Pair, holds: Pair, d: float) -> tuple[Heigh
 def shares(total: float, holds: Pair) -> Pair:
     """T_1 and T_2 of a total in N: halves, or what one cannot hold of its half, the other does."""
     hold_1, hold_2 = holds
-    half = 0.5 * abs(total)
-    t_1 = min(half, hold_1) if hold_1 <= hold_2 else abs(total) - min(half, hold_2)
-    t_2 = abs(total) - t_1
-    return (t_1, t_2) if total >= 0.0 else (-t_1, -t_2)
+    smaller = copysign(min(0.5 * abs(total), hold_1, hold_2), total)
+    larger = total - smaller
+    return (smaller, larger) if hold_1 <= hold_2 else (larger, smaller)
