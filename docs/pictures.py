@@ -17,6 +17,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import delicate_picture
 import numpy as np
 import tutorials
 from grasp_cosim import hand_system, simulate, tandem_system
@@ -185,6 +186,7 @@ PICTURES: Mapping[str, tuple[Callable[[Path], None], Sequence[str]]] = {
     "sweep": (draw_sweep_of_widths, ["sweep.png"]),
     "maps": (draw_map, ["reflectance_map.png"]),
     "layer_2": (draw_layer_2, ["layer_2_loop.png"]),
+    "delicate": (delicate_picture.draw, ["delicate.png"]),
     "method": (partial(tutorials.update, "explanation/method"), ["layers.png", "objects.png"]),
     "adaptive_law": (
         partial(tutorials.update, "explanation/adaptive_law"),

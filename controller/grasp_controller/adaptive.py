@@ -41,6 +41,7 @@ class State(NamedTuple):
     line_2: reflectance_ratio.Line
     estimate: reflectance_ratio.Estimate
     closing: float
+    lasting: float
     hold: float
 
 
@@ -66,7 +67,7 @@ def initial_state(p: Params, u: Inputs) -> State:
     gaps = reflectance_ratio.gaps(p.reflectance, p.sensors, line_1, line_2)
     seen = reflectance_ratio.by_one_sensor(p.sensors, p.mean_sensor, gaps, u.intensity)
     layers = series.initial_state(p, u._replace(intensity=seen))
-    return State(layers, line_1, line_2, estimate, 0.0, 0.0)
+    return State(layers, line_1, line_2, estimate, 0.0, 0.0, 0.0)
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
@@ -74,7 +75,12 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     v_1, v_2 = u.velocity
     closing = holding.filtered(p.hold, x.closing, v_1 - v_2, h)
     u_1, u_2 = series.outputs(p, x.layers, u).force
-    hold = holding.hold(p.hold, 0.5 * u_2 - 0.5 * u_1, closing)
+    pressed = holding.pressed(p.hold, 0.5 * u_2 - 0.5 * u_1, closing)
+    lasting = holding.lasting(p.hold, x.lasting, pressed, h)
+    eye_1, eye_2 = p.sensors
+    touching_1 = holding.touching(p.hold, p.reflectance, eye_1, x.line_1, lasting)
+    touching_2 = holding.touching(p.hold, p.reflectance, eye_2, x.line_2, lasting)
+    hold = pressed * (touching_1 * touching_2)  # (R9)
     floor = p.impact_reduction.intensity_floor
     free, lines = 1.0 - hold, (x.line_1, x.line_2)
     line_1, line_2 = reflectance_ratio.both_moved(
@@ -86,7 +92,7 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     alike = reflectance_ratio.alike(estimate, seen)
     f_s = free * layer_3.virtual_force(p.simultaneous_contact, alike)  # Eq. (2')
     layers = series.advance(p, x.layers, u._replace(intensity=seen), f_s, h)
-    return State(layers, line_1, line_2, estimate, closing, hold)
+    return State(layers, line_1, line_2, estimate, closing, lasting, hold)
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:

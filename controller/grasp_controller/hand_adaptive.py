@@ -109,6 +109,7 @@ class State(NamedTuple):
     lines: Lines
     brightness: Brightness
     closing: float
+    lasting: float
     hold: float
 
 
@@ -160,19 +161,23 @@ def initial_state(p: Params, u: Inputs) -> State:
     )
     seen = by_one_sensor(p, lines, u.intensity)
     layers = hand.initial_state(p, u._replace(intensity=seen))
-    return State(layers, lines, Brightness(ZEROS, 1.0), 0.0, 0.0)
+    return State(layers, lines, Brightness(ZEROS, 1.0), 0.0, 0.0, 0.0)
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance the virtual objects by h seconds (h > 0), the samples u held, and learn from them."""
-    rate, pressed = 0.0, 0.0
+    rate, squeeze = 0.0, 0.0
     y = hand.outputs(p, x.layers, u)
     for s_dot, force in zip(u.velocity, y.force, strict=True):
         rate = rate + s_dot
-        pressed = pressed - force
+        squeeze = squeeze - force
     fingers = float(FINGERS)
     closing = holding.filtered(p.hold, x.closing, 2.0 * rate / fingers, h)
-    hold = holding.hold(p.hold, pressed / fingers, closing)
+    pressed = holding.pressed(p.hold, squeeze / fingers, closing)
+    lasting = holding.lasting(p.hold, x.lasting, pressed, h)
+    hold = pressed
+    for eye, line in zip(p.sensors, x.lines, strict=True):
+        hold = hold * holding.touching(p.hold, p.reflectance, eye, line, lasting)  # (R9)
     floor = p.impact_reduction.intensity_floor
     free, low_pass = 1.0 - hold, reflectance_ratio.low_pass(p.reflectance, h)
     lines = tuple(
@@ -185,7 +190,7 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     f_s = hand.virtual_forces(p, alike(b, seen))
     # Eq. (2N')
     layers = hand.advance(p, x.layers, u._replace(intensity=seen), tuple(free * f for f in f_s), h)
-    return State(layers, lines, brightness, closing, hold)
+    return State(layers, lines, brightness, closing, lasting, hold)
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:

@@ -7,8 +7,11 @@ Derivation: controller/README.md
     (R1) y = kappa·(s - surface + l_0),   kappa = (K·alpha)^(-1/n)
     (R2) w = xi^q·travel                  weight of a point, by the travel that it stands for
     (R3) kappa = C_sy/C_ss                from weighted sums about the weighted means
-    (R4) beta = sigma_b^2/(sigma_b^2 + V_1 + V_2)·clip(n·ln(kappa_2/kappa_1), -beta_max, beta_max)
-    (R5) V = sigma^2·Q/C_sy^2,     Q = sum of (w·xi^(-1-1/n)·(s - mean of s))^2·(1 + 2·T_f/h)
+    (R4) beta = p·sigma_b^2/(sigma_b^2 + V)·f,   p = 1 - exp(-f^2/(2·gamma^2·V)),   V = V_1 + V_2,
+         f = clip(ln alpha_1 - ln alpha_2, -beta_max, beta_max),   ln alpha = -n·ln kappa - ln K
+    (R5) sigma^2·Q/C_sy^2,     Q = sum of (w·xi^(-1-1/n)·(s - mean of s))^2·(1 + 2·T_f/h)
+    (R10) what one sensor with the mean n, l_0 and K gives at the gaps that are learnt
+    (R11) V_j: (R5), and the squares of what errors of the calibration move
 """
 
 from dataclasses import dataclass
@@ -307,12 +310,13 @@ def moved(
     if 0.0 < c_ss < inf and 0.0 < c_sy < inf and 0.0 < q_2 < inf:
         per_y = c_ss / c_sy  # 1/kappa, (R3)
         relative = p.intensity_noise / c_sy
+        # (R11)
         by_offset = p.offset_deviation * c_so / c_sy
         known = relative * relative * q_2 + by_offset * by_offset
         bend = c_sn / c_sy
         by_n = p.exponent_deviation * (bend - log_y)
         by_l_0 = p.offset_distance_deviation * eye.n / (y * per_y)
-        variance = known + by_n * by_n + by_l_0 * by_l_0  # V, (R5)
+        variance = known + by_n * by_n + by_l_0 * by_l_0
         by_n = p.exponent_deviation * (bend + log(per_y))
         brightness_variance = known + by_n * by_n + p.gain_deviation * p.gain_deviation
     means = (total, mean_s, line.mean_y + new * from_y)
@@ -441,6 +445,7 @@ def translated(eye: Sensor, mean: Sensor, gap: float) -> float:
     """How much more a sensor `mean` gives than `eye` at a gap in m, whatever the face."""
     gap = max(gap, 0.0)
     d, common = max(gap + eye.l_0, TINY), max(gap + mean.l_0, TINY)
+    # (R10)
     return exp(mean.log_gain - eye.log_gain + eye.n * log(d) - mean.n * log(common))
 
 
@@ -452,10 +457,15 @@ def gaps(p: Params, eyes: Sensors, line_1: Line, line_2: Line) -> Pair:
 
 def gap(p: Learning, eye: Sensor, line: Line) -> float:
     """The gap in m of a finger, 1/kappa drawn towards that of a white face as it is uncertain."""
-    prior = p.prior_deviation * p.prior_deviation
-    gain = prior / (prior + line.variance) if prior > 0.0 else 0.0
+    gain = known(p, line)
     per_y = (1.0 - gain) * eye.white + gain * line.per_y
     return line.y * per_y - eye.l_0 + line.ahead  # (R1) for the gap
+
+
+def known(p: Learning, line: Line) -> float:
+    """How far the slope of a line is known, from 0 without one to 1."""
+    prior = p.prior_deviation * p.prior_deviation
+    return prior / (prior + line.variance) if prior > 0.0 else 0.0
 
 
 def _clamped(x: float, low: float, high: float) -> float:

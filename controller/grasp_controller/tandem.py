@@ -56,13 +56,17 @@ class SimultaneousContact(Group, name="simultaneous_contact"):
 
 @dataclass(frozen=True)  # no slots: what is worked out from the parameters is kept
 class Params:
-    """The parameters of the three layers, and of what is learnt."""
+    """The parameters of the three layers, and of what is learnt.
+
+    One finger cannot be held up by friction here. So the grasp counts from 2 mm/s on: the sooner
+    it does, the less the wrist moves after the contacts.
+    """
 
     simultaneous_contact: SimultaneousContact = SimultaneousContact()
     impact_reduction: layer_2.Params = layer_2.Params()
     contact_force: layer_1.Params = layer_1.Params()
     reflectance: reflectance_ratio.Params = reflectance_ratio.Params()
-    hold: holding.Params = holding.Params()
+    hold: holding.Params = holding.Params(speed=2e-3)
     wrist: Wrist = Wrist()
 
     @cached_property
@@ -92,6 +96,7 @@ class State(NamedTuple):
     line_2: Line
     estimate: Estimate
     closing: float
+    lasting: float
     hold: float
 
 
@@ -163,7 +168,7 @@ def initial_state(p: Params, u: Inputs) -> State:
     nothing = (0.0, 0.0)
     return State(
         virtual, middle, target, u.position, seen, nothing,
-        line_1, line_2, estimate, 0.0, 0.0,
+        line_1, line_2, estimate, 0.0, 0.0, 0.0,
     )  # fmt: skip
 
 
@@ -171,10 +176,15 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance virtual opening and wrist by h seconds (h > 0), the samples u held, and learn."""
     v_1, v_2 = u.velocity
     closing = holding.filtered(p.hold, x.closing, v_1 - v_2, h)
-    pressed = holding.hold(p.hold, -0.5 * _grip_force(p, x.virtual, u), closing)
     gaps = reflectance_ratio.gaps(p.reflectance, p.sensors, x.line_1, x.line_2)
     seen = reflectance_ratio.by_one_sensor(p.sensors, p.mean_sensor, gaps, u.intensity)
-    hold = wrist_guidance.agreed(pressed, _imbalance(x.estimate, seen))
+    pressed = holding.pressed(p.hold, -0.5 * _grip_force(p, x.virtual, u), closing)
+    lasting = holding.lasting(p.hold, x.lasting, pressed, h)
+    eye_1, eye_2 = p.sensors
+    touching_1 = holding.touching(p.hold, p.reflectance, eye_1, x.line_1, lasting)
+    touching_2 = holding.touching(p.hold, p.reflectance, eye_2, x.line_2, lasting)
+    held = pressed * (touching_1 * touching_2)  # (R9)
+    hold = wrist_guidance.agreed(held, _imbalance(x.estimate, seen))
     free = 1.0 - hold
     believed = free * wrist_guidance.steadiness(0.5 * (v_1 - v_2), 0.5 * (v_1 + v_2))
     floor, lines = p.impact_reduction.intensity_floor, (x.line_1, x.line_2)
@@ -195,7 +205,7 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     virtual = _closed(p, x.virtual, pull, f_p, h)
     return State(
         virtual, wrist_command, target, x.fingertips, seen, f_p,
-        line_1, line_2, estimate, closing, hold,
+        line_1, line_2, estimate, closing, lasting, hold,
     )  # fmt: skip
 
 

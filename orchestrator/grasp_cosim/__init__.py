@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from .comparison.changes import diff
     from .comparison.compare import compare
     from .comparison.qualify import qualify
+    from .grasp.delicate import delicate_system
     from .grasp.identification.identification import identify
     from .grasp.published.evaluation import evaluate
     from .grasp.system import grasp_system
@@ -61,6 +62,7 @@ __all__ = [
     "StateSpace",
     "System",
     "compare",
+    "delicate_system",
     "diff",
     "evaluate",
     "grasp_system",
@@ -88,6 +90,7 @@ _MODULES = {
     "StateSpace": "linearisation.state_space",
     "System": "system.description",
     "compare": "comparison.compare",
+    "delicate_system": "grasp.delicate",
     "diff": "comparison.changes",
     "evaluate": "grasp.published.evaluation",
     "grasp_system": "grasp.system",

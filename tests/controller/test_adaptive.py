@@ -17,6 +17,7 @@ from support.approach import (
     H,
     approach,
     assert_mirrored,
+    intensity,
     mirrored,
     numbers,
     pairs,
@@ -316,20 +317,63 @@ HOLD = holding.Params()
 
 
 @pytest.mark.parametrize(
-    ("press", "closing", "hold"),
+    ("press", "closing", "pressed"),
     [
         (0.0, 0.0, 0.0),
         (0.1, 0.0, 0.5),
-        (0.1, 2e-3, 0.25),
-        (0.1, -2e-3, 0.25),
+        (0.1, 5e-4, 0.25),
+        (0.1, -5e-4, 0.25),
         (1e3, 0.0, 1.0),
         (0.2, 0.0, 0.8),
-        (0.1, 4e-3, 0.1),
+        (0.1, 1e-3, 0.1),
         (-5.0, 0.0, 0.0),
     ],
 )
-def test_half_a_grasp_is_at_p_0_and_at_w_0(press, closing, hold):
-    assert holding.hold(HOLD, press, closing) == pytest.approx(hold, abs=1e-7)
+def test_half_a_grasp_is_at_p_0_and_at_w_0(press, closing, pressed):
+    assert holding.pressed(HOLD, press, closing) == pytest.approx(pressed, abs=1e-7)
+
+
+EYE, _ = Params().sensors
+
+
+def line_at(gap, known=True, **more):
+    """A finger's line, by which it is at this gap in m by light and by way; 5 mm to the element."""
+    n = EYE.n
+    y = intensity(gap, 0.57) ** (-1.0 / n)
+    point = reflectance_ratio.first_point(EYE, 1e-6, 0.05, y**-n)
+    if not known:
+        return point
+    return point._replace(per_y=(gap + 5e-3) / y, variance=0.0, **more)
+
+
+def touching(line, lasting=0.3):
+    return holding.touching(HOLD, reflectance_ratio.Params(), EYE, line, lasting)
+
+
+@pytest.mark.parametrize(
+    ("gap", "near"),
+    [(-1e-3, 1.0), (0.0, 1.0), (1.5e-3, 256 / 257), (3e-3, 0.5), (6e-3, 1 / 257), (0.1, 0.0)],
+)
+def test_half_a_contact_is_at_l_h(gap, near):
+    assert touching(line_at(gap)) == pytest.approx(near, abs=1e-9)
+
+
+def test_without_a_line_only_time_tells_of_a_contact():
+    assert touching(line_at(0.0, known=False), 0.3) == 0.3
+    assert touching(line_at(0.1, known=False), 0.3) == 0.3
+    half = line_at(6e-3)._replace(variance=reflectance_ratio.Params().prior_deviation ** 2)
+    assert touching(half, 0.3) == pytest.approx(0.5 * (1 / 257 + 0.3), abs=1e-9)
+    after = holding.lasting(HOLD, 0.0, 1.0, 1e-3)
+    assert after == pytest.approx(1e-3 / HOLD.blind_time, rel=2e-3)
+
+
+def test_the_nearer_one_of_light_and_way_counts():
+    """The sensor is stuck at 50 mm, and the finger at the face; or it carries the face along."""
+    stuck = line_at(0.05)
+    assert touching(stuck._replace(s=stuck.s - 0.05)) == pytest.approx(1.0, abs=1e-9)
+    carried = line_at(0.0)
+    assert touching(carried._replace(s=carried.s + 0.05)) == pytest.approx(1.0, abs=1e-9)
+    assert touching(stuck._replace(s=stuck.s + 0.05)) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_the_speed_is_low_passed():

@@ -51,7 +51,17 @@ def test_a_name_that_is_none(pictures):
 @pytest.mark.parametrize(
     "name",
     [
-        *("hand", "three", "tandem", "loop", "three_layers", "evaluation", "report", "layer_2"),
+        *(
+            "hand",
+            "three",
+            "tandem",
+            "loop",
+            "three_layers",
+            "evaluation",
+            "report",
+            "layer_2",
+            "delicate",
+        ),
         pytest.param("maps", marks=only_whole("takes more than a minute")),
     ],
 )

@@ -65,6 +65,7 @@ NEAR = {
 CASES = {
     "GripperPlant": FORCE,  # both fingers hit the object
     "GripperPlantCompliant": FORCE,
+    "GripperPlantDelicate": FORCE,
     "GripperPlantMovable": FORCE,
     "ProximitySensor": {"gap": 0.0123},
     "GraspController": NEAR,

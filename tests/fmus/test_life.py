@@ -22,13 +22,14 @@ BLOCKS = blocks()
 PARAMETERS = {
     "GripperPlant": {"finger_mass[1]": 0.7, "object_width": 0.06},
     "GripperPlantCompliant": {"finger_mass[1]": 0.7, "kelvin_voigt.stiffness": 800.0},
+    "GripperPlantDelicate": {"object_mass": 0.04, "lift.enabled": True},
     "GripperPlantMovable": {"object_mass": 0.04, "friction.coulomb[2]": 0.1},
     "ProximitySensor": {"offset_distance": 0.006},
     "GraspController": {"contact_force.stiffness": 90.0, "impact_reduction.mass": 1.3},
     "GraspControllerAdaptive": {"contact_force.stiffness": 90.0, "hold.squeeze": 0.2},
 }
 NAMES = tuple(PARAMETERS)
-PLANTS = NAMES[:3]
+PLANTS = NAMES[:4]
 
 
 def test_outputs_agree_with_inputs_in_initialisation_mode(load):
@@ -78,10 +79,16 @@ def test_a_block_without_sub_steps_takes_any_step(load, name):
         assert instance.step(0.0, 1e300) == OK
 
 
+STIFF = {
+    "GripperPlant": {"baumgarte_alpha": 1e5},
+    "GripperPlantDelicate": {"side.stiffness": 1e7},
+}
+
+
 @pytest.mark.parametrize("name", PLANTS)
 def test_a_step_with_too_many_sub_steps_is_discarded(load, name):
     """They would be over 20,000; the instance takes a shorter one."""
-    stiff = {"baumgarte_alpha" if name == PLANTS[0] else "kelvin_voigt.damping": 1e5}
+    stiff = STIFF.get(name, {"kelvin_voigt.damping": 1e5})
     closed = {"initial_position[1]": 0.0651, "initial_position[2]": -0.0051}
     with Instance(load(name)).initialise(**closed, **stiff) as instance:
         assert instance.set({"force[1]": -3.0, "force[2]": 3.0}) == OK

@@ -60,6 +60,38 @@ def test_a_start_within_millimetres_of_a_face(natives, alpha, gap):
     assert np.all(np.abs(np.log(result["controller.reflectance_ratio"])) <= 2.5)
 
 
+def friction(right, left):
+    """Coulomb friction of the fingers, N."""
+    return {"plant.friction.coulomb[1]": right, "plant.friction.coulomb[2]": left}
+
+
+@pytest.mark.parametrize("alpha", [(1.0, 1.0), (0.57, 1.0)])
+def test_there_is_no_hold_before_there_is_a_contact(natives, alpha):
+    """At the start the fingers press on nothing and do not move yet."""
+    result = run(adaptive_grasp(natives), values_of(alpha), STEP, 2.5)
+    hold = result["controller.hold"]
+    first, last_one = sorted(round(t / STEP) for t in result.metrics["time_to_contact"])
+    assert hold[:first].max() < 1e-3
+    assert hold[last_one + 200 :].min() > 0.99
+
+
+def test_fingers_that_friction_holds_away_from_the_faces_hold_nothing(natives):
+    """5 N stop them for good at 16 mm, where they press with K_i·(W/2 + l) and do not move."""
+    result = run(adaptive_grasp(natives), {**values_of(), **friction(5.0, 5.0)}, 2e-3, 9.0)
+    assert result["plant.gap[1]"][-1] == pytest.approx(0.016, abs=2e-4)
+    assert result["controller.force[2]"][-1] > 4.9
+    assert result["controller.hold"][-1] < 1e-4
+
+
+@pytest.mark.parametrize("forces", [(3.0, 2.0), (2.0, 3.0), (2.5, 1.0)])
+def test_friction_costs_the_adaptive_law_no_more_than_the_published_one(natives, forces):
+    """White faces, so that there is nothing to learn: 0.54 and 0.51 s; 0.80 with p for h."""
+    values = {**values_of(), **friction(*forces)}
+    ours = run(adaptive_grasp(natives), values, STEP, 6.0)
+    published = run(System.load(SYSTEM, natives), values, STEP, 6.0)
+    assert apart(ours) < apart(published) + 0.035
+
+
 SEED = 20241107
 FACES = {
     "sensor_1.reflectance": (0.3, 1.2),

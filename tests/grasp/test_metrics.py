@@ -359,13 +359,37 @@ def test_the_object_has_the_metrics_that_the_plant_has_outputs_for():
     assert grasp_metrics(time, signals | {"plant.damaged": never})["damaged"] is False
 
 
+def test_the_margins_of_a_lift_are_the_smallest_while_it_lasts():
+    """Of a fingertip by what it carries, of both by what it takes not to slip."""
+    time = every(1e-3, 0.003)
+    signals = {
+        "plant.friction_limit[1]": np.array([0.1, 3.0, 2.0, 0.1]),
+        "plant.friction_limit[2]": np.array([0.1, 3.0, 1.0, 0.1]),
+        "plant.tangential_force[1]": np.array([0.0, 1.0, 1.6, 0.0]),
+        "plant.tangential_force[2]": np.array([0.0, -1.0, 1.0, 0.0]),
+        "plant.load": np.array([0.0, 2.0, 4.0, 0.0]),
+        "plant.peak_pressure": np.array([0.0, 10.0, 20.0, 20.0]),
+    }
+    margins = grasp_metrics(time, signals)
+    assert margins["friction_margin"] == [1.25, 1.0]
+    assert margins["lift_margin"] == 0.75
+    assert margins["peak_pressure"] == 20.0
+    signals |= {name: 0.0 * signals[name] for name in signals if "limit" not in name}
+    margins = grasp_metrics(time, signals)
+    assert margins["friction_margin"] == [None, None]
+    assert margins["lift_margin"] is None
+
+
 def test_every_metric_has_a_unit_and_a_label(snapshot):
     time, signals = impact(1e-3)
-    outputs = ("tilt", "toppled", "squeeze", "damaged")
+    outputs = (
+        "tilt", "toppled", "squeeze", "damaged", "slip", "dropped", "peak_pressure", "load",
+        "friction_limit[1]", "friction_limit[2]", "tangential_force[1]", "tangential_force[2]",
+    )  # fmt: skip
     signals |= {f"plant.{output}": np.zeros(len(time)) for output in outputs}
     there = [m.name for m in METRICS if m.name not in OF_FREE_FINGERS]
     assert list(grasp_metrics(time, signals)) == there
     shown = [f"{m.name}: {m.title}, {m.unit}, {m.display_unit}, {m.factor:.6g}" for m in METRICS]
     assert shown == snapshot
-    assert len(OF_OBJECT) == len(outputs)
+    assert len(OF_OBJECT) == 9
     assert {m.name for m in METRICS if m.reason} == OF_FREE_FINGERS

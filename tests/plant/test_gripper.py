@@ -3,8 +3,19 @@
 from dataclasses import replace
 from math import inf
 
+import numpy as np
 import pytest
-from gripper_plant import compliant, contact_laws, fingers, friction, movable, rigid
+from gripper_plant import (
+    compliant,
+    contact_laws,
+    delicate,
+    fingers,
+    friction,
+    lift,
+    movable,
+    rigid,
+    zener,
+)
 from gripper_plant.box import Box
 from gripper_plant.fingers import Inputs
 from hypothesis import given
@@ -17,7 +28,9 @@ POINT = {"initial_position": {"object_width": 0.0}, "object_width": WIDE,
          "initial_object_position": WIDE | {"object_width": 0.0}}  # fmt: skip
 """Per parameter, the others such that both ends of its range are possible."""
 PARTS = [
-    *((block.Params, "") for block in (rigid, compliant, movable)), (friction.Params, "friction."),
+    *((block.Params, "") for block in (rigid, compliant, delicate, movable)),
+    (friction.Params, "friction."), (zener.Side, "side."), (zener.Pad, "pad."),
+    (lift.Lift, "lift."),
     (fingers.Actuator, "actuator."), (contact_laws.KelvinVoigt, "kelvin_voigt."),
     (contact_laws.HuntCrossley, "hunt_crossley."),
 ]  # fmt: skip
@@ -64,14 +77,15 @@ def test_what_does_not_go_together_is_refused(part, values, said):
     assert said in refused(part, **values)
 
 
-@pytest.mark.parametrize("block", [rigid, compliant, movable])
+@pytest.mark.parametrize("block", [rigid, compliant, delicate, movable])
 def test_the_start_is_at_rest_where_the_parameters_say(block):
     p = block.Params(initial_position=(0.2, -0.15), initial_object_position=-0.01)
     y = block.outputs(p, block.initial_state(p, Inputs()), Inputs())
     assert (y.position, y.velocity) == ((0.2, -0.15), (0.0, 0.0))
     assert (y.contact_force, y.contact) == ((0.0, 0.0), (False, False))
     assert (y.object_position, y.gap) == (-0.01, pytest.approx((0.175, 0.105), rel=1e-14))
-    assert not any(y[6:])
+    assert y.first_contact_time == (-1.0, -1.0)
+    assert not any(np.hstack((0.0, *y._replace(first_contact_time=(0.0, 0.0))[6:])))
     p = block.Params(initial_position=(1.0, -0.5), object_width=1.5, initial_object_position=0.25)
     y = block.outputs(p, block.initial_state(p, Inputs()), Inputs())
     assert (y.gap, y.contact, y.contact_force) == ((0.0, 0.0), (True, True), (0.0, 0.0))
@@ -97,18 +111,28 @@ def mirrored(x):
     """The same state seen from behind the gripper."""
     pairs = {name: swapped(getattr(x, name)) for name in ("position", "velocity", "contact_force")}
     turned = {"box": Box(*(-value for value in x.box))} if hasattr(x, "box") else {}
-    return x._replace(**pairs, **turned)
+    if hasattr(x, "dashpot"):
+        turned = {
+            "dashpot": x.dashpot[::-1],
+            "object": (-x.object[0], -x.object[1]),
+            "load": x.load._replace(tangential=x.load.tangential[::-1]),
+            "blow_1": x.blow_2,
+            "blow_2": x.blow_1,
+        }
+    return x._replace(touch=x.touch[::-1], **pairs, **turned)
 
 
 @st.composite
 def grippers(draw):
     """Close to an object, so that a few steps reach it, and moving."""
-    block = draw(st.sampled_from([rigid, compliant, movable]))
+    block = draw(st.sampled_from([rigid, compliant, delicate, movable]))
     x_m = 0.0 if block is movable else draw(st.floats(-0.05, 0.05))  # tilts by what is rounded
     near, speeds, masses = st.floats(1e-6, 2e-3), st.floats(-0.3, 0.3), st.floats(0.05, 5.0)
-    more = (
-        {} if block is rigid else {"hunt_crossley": contact_laws.HuntCrossley(draw(st.booleans()))}
-    )
+    more = {}
+    if block in (compliant, movable):
+        more = {"hunt_crossley": contact_laws.HuntCrossley(draw(st.booleans()))}
+    if block is delicate:
+        more = {"lift": lift.Lift(draw(st.booleans())), "pad": zener.Pad(500.0)}
     if block is movable:
         more |= {"floor_friction": draw(st.sampled_from([0.0, 0.3, 0.9])), "contact_height": 0.08}
     p = block.Params(

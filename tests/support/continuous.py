@@ -38,8 +38,11 @@ class Adaptive:
     sigma_K: float = 0.05
     gamma: float = 0.5
     P_0: float = 0.1
-    w_0: float = 2e-3
+    w_0: float = 5e-4
     T_w: float = 0.02
+    l_h: float = 3e-3
+    T_h: float = 1.0
+    l_0: float = 5e-3
 
 
 class Line(NamedTuple):
@@ -70,7 +73,8 @@ SIZE = len(Line._fields)
 class Learning:
     """The equations of what is learnt, from the first intensities in V and ways s in m on.
 
-    Its state: the lines of both fingers, then the low-passed speed of closing in m/s.
+    Its state: the lines of both fingers, then the low-passed speed of closing in m/s, and how long
+    the fingers have pressed without a motion.
     """
 
     p: Adaptive
@@ -80,13 +84,33 @@ class Learning:
     def start(self):
         """Nothing learnt, both fingers at rest."""
         line = [1.0, 0.0, *[0.0] * (SIZE - 2)]
-        return [*line, *line, 0.0]
+        return [*line, *line, 0.0, 0.0]
 
-    def hold(self, z, u):
-        """h, from the forces u in N."""
-        squeeze, w = max(0.0, 0.5 * (u[1] - u[0])), z[-1]
+    def pressed(self, z, u):
+        """p, from the forces u in N."""
+        squeeze, w = max(0.0, 0.5 * (u[1] - u[0])), z[-2]
         pressed = squeeze**2 / (squeeze**2 + self.p.P_0**2)
         return pressed * self.p.w_0**2 / (self.p.w_0**2 + w**2)
+
+    def hold(self, z, s, u):
+        """h, from the ways s in m and the forces u in N."""
+        line_1, line_2 = _lines(z)
+        first = self._touching(line_1, s[0] - self.s_0[0], self.xi_0[0], z[-1])
+        second = self._touching(line_2, s[1] - self.s_0[1], self.xi_0[1], z[-1])
+        return self.pressed(z, u) * first * second
+
+    def _touching(self, line, way, xi_0, lasting):
+        """How far a finger may be at its face that has gone a way in m."""
+        kappa = _fit(line)
+        if kappa is None:
+            return lasting
+        known = self.p.sigma_b**2 / (self.p.sigma_b**2 + self._variances(line, kappa, xi_0)[0])
+        zero = (line.sum_s - line.sum_y / kappa) / line.weight  # way at which the line has y = 0
+        by_way = way - MILLIMETRE * zero
+        by_light = way + MILLIMETRE * (line.xi ** (-1.0 / self.p.n) / kappa - line.s)
+        l = max(0.0, min(by_way, by_light) - self.p.l_0)
+        near = self.p.l_h**8 / (self.p.l_h**8 + l**8)
+        return known * near + (1.0 - known) * lasting
 
     def beta(self, z):
         """Return ln(alpha_1/alpha_2) as learnt, and its standard deviation."""
@@ -109,13 +133,14 @@ class Learning:
         deviation = sqrt(prior * (1.0 - gain) + missed**2)
         return acts * prior / (prior + variance) * fitted, deviation
 
-    def rates(self, z, s, xi, closing, h):
-        """The derivative of the state, at ways s in m and intensities xi in V."""
-        rates = []
+    def rates(self, z, s, xi, closing, u):
+        """The derivative of the state, at ways s in m, intensities xi in V and forces u in N."""
+        rates, h = [], self.hold(z, s, u)
         for j, line in enumerate(_lines(z)):
             way = (s[j] - self.s_0[j]) / MILLIMETRE
             rates += self._line_rates(line, way, xi[j] / self.xi_0[j], 1.0 - h)
-        return [*rates, (closing - z[-1]) / self.p.T_w]
+        lasting_rate = (self.pressed(z, u) - z[-1]) / self.p.T_h
+        return [*rates, (closing - z[-2]) / self.p.T_w, lasting_rate]
 
     def _line_rates(self, line, s, xi, believed):
         n, T_f = self.p.n, self.p.T_f
@@ -319,11 +344,11 @@ def _learning(p):
 
 def _learning_rates(p, learning, y):
     ways, seen = (y[0], -y[2]), (_intensity(p, y, 0), _intensity(p, y, 1))
-    return learning.rates(y[LEARNT], ways, seen, y[1] - y[3], _hold(p, learning, y))
+    return learning.rates(y[LEARNT], ways, seen, y[1] - y[3], _commands(p, y))
 
 
-def _hold(p, learning, y):
-    return learning.hold(y[LEARNT], (_command(p, y, 0), _command(p, y, 1)))
+def _commands(p, y):
+    return _command(p, y, 0), _command(p, y, 1)
 
 
 def _command(p, y, j):
@@ -340,7 +365,8 @@ def _virtual_force(p, y):
         return p.K_s * tanh((xi_1 - xi_2) / (xi_1 + xi_2))
     beta, _ = learning.beta(y[LEARNT])
     xi_2 *= exp(beta)
-    return (1.0 - _hold(p, learning, y)) * p.K_s * tanh((xi_1 - xi_2) / (xi_1 + xi_2))
+    h = learning.hold(y[LEARNT], (y[0], -y[2]), _commands(p, y))
+    return (1.0 - h) * p.K_s * tanh((xi_1 - xi_2) / (xi_1 + xi_2))
 
 
 def _targets(p, y, touching):

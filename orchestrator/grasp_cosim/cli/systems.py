@@ -44,6 +44,11 @@ NAME = re.compile(r"[A-Za-z0-9_-]+")
     "--tandem", is_flag=True, help="Write the system of a gripper in tandem on the wrist of an arm."
 )
 @click.option(
+    "--delicate",
+    is_flag=True,
+    help="Write the system of delicate things that are grasped and lifted.",
+)
+@click.option(
     "--template",
     type=click.Choice([*BLOCK_TEMPLATES]),
     help="Write a block in Python and its test. `build` makes an FMU from the block.",
@@ -57,6 +62,7 @@ def init(
     fingers: int | None,
     angles: str | None,
     tandem: bool,
+    delicate: bool,
     template: str | None,
     force: bool,
     as_json: bool,
@@ -72,6 +78,7 @@ def init(
     Use only one FMU: grasp-cosim init my_system.toml --fmu ball=BouncingBall.fmu
     Describe a hand: grasp-cosim init hand.toml --fingers 3 --angles 0,90,225
     Describe a gripper on an arm: grasp-cosim init tandem.toml --tandem
+    Describe delicate things: grasp-cosim init delicate.toml --delicate
     Write a plant in Python: grasp-cosim init my_plant.py --template plant
     """
     if template:
@@ -81,6 +88,7 @@ def init(
             "--fingers": fingers,
             "--angles": angles,
             "--tandem": tandem,
+            "--delicate": delicate,
         }
         for option, value in of_systems.items():
             if value:
@@ -96,7 +104,13 @@ def init(
     foreign = _fmus_by_component("--as", candidates)
     alone_fmus = _fmus_by_component("--fmu", fmus)
     hand = fingers is not None or angles is not None
-    _check_together(file, foreign, alone=bool(alone_fmus), hand=hand, tandem=tandem)
+    systems = {
+        "--fmu": bool(alone_fmus),
+        "--fingers and --angles": hand,
+        "--tandem": tandem,
+        "--delicate": delicate,
+    }
+    _check_together(file, foreign, systems)
     drafts: dict[str, Draft] = {}
     notes: list[str] = []
     if alone_fmus:
@@ -105,7 +119,8 @@ def init(
     elif hand:
         text, notes = _hand_text(file.parent, fingers, angles)
     else:
-        text, drafts = _built_in_text(file.parent, tandem, foreign)
+        built_in_file = _built_in_file(tandem, delicate)
+        text, drafts = _built_in_text(file.parent, built_in_file, foreign)
     write_text(file, text)
     unfilled = to_do(text)
     if not unfilled and file.is_file():
@@ -152,25 +167,22 @@ def _write_block(file: Path, kind: str, force: bool, as_json: bool) -> int:
     return 0
 
 
-def _check_together(
-    file: Path, foreign: Mapping[str, Path], alone: bool, hand: bool, tandem: bool
-) -> None:
-    """InputError where options name two systems: one of only FMUs, of a hand, a tandem, a grasp.
+def _check_together(file: Path, foreign: Mapping[str, Path], kinds: Mapping[str, bool]) -> None:
+    """InputError where options name two systems; `kinds` has them by the options that ask for them.
 
-    Foreign FMUs may be in the place of components of the last two.
+    Foreign FMUs may not be in the place of components of a hand, nor next to only FMUs.
     """
-    if hand and foreign:
+    if kinds["--fingers and --angles"] and foreign:
         fmus = " ".join(f"--swap {name}={quote(str(fmu))}" for name, fmu in foreign.items())
         raise InputError(
             "--fingers and --angles cannot be used with --as; write the system of the hand, then "
             f"`grasp-cosim run {quote(str(file))} {fmus}`"
         )
-    if alone and foreign:
+    if kinds["--fmu"] and foreign:
         raise InputError(
             "--fmu cannot be used with --as; --fmu makes a system of only these FMUs, "
             "--as puts one into the grasp"
         )
-    kinds = {"--fmu": alone, "--fingers and --angles": hand, "--tandem": tandem}
     requested = [option for option, is_requested in kinds.items() if is_requested]
     if len(requested) > 1:
         raise InputError(
@@ -220,15 +232,23 @@ def _hand_text(folder: Path, fingers: int | None, angles: str | None) -> tuple[s
     return _from_below(hand_text(directions)), [note] if note else []
 
 
-def _built_in_text(
-    folder: Path, tandem: bool, foreign: Mapping[str, Path]
-) -> tuple[str, dict[str, Draft]]:
-    """The text of a built-in system, with foreign FMUs in the place of components."""
+def _built_in_file(tandem: bool, delicate: bool) -> Path:
+    """The file of a built-in system."""
+    from ..grasp.delicate import SYSTEM as DELICATE
     from ..grasp.presets import SYSTEM as GRASP
-    from ..grasp.system import built
     from ..tandem.system import SYSTEM as TANDEM
 
-    file = TANDEM if tandem else GRASP
+    if tandem:
+        return TANDEM
+    return DELICATE if delicate else GRASP
+
+
+def _built_in_text(
+    folder: Path, file: Path, foreign: Mapping[str, Path]
+) -> tuple[str, dict[str, Draft]]:
+    """The text of a built-in system, with foreign FMUs in the place of components."""
+    from ..grasp.system import built
+
     built_in = System.load(file, built(folder))
     text = _from_below(file.read_text("utf-8"))
     drafts = {}

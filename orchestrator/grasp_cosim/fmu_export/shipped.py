@@ -44,6 +44,10 @@ SHIPPED: Mapping[str, Shipped] = {
     "GripperPlantCompliant": Shipped(
         "Two-finger gripper and a fixed object that gives", "gripper_plant.compliant"
     ),
+    "GripperPlantDelicate": Shipped(
+        "Two-finger gripper and a delicate body, which relaxes, is lifted and may slip",
+        "gripper_plant.delicate",
+    ),
     "GripperPlantMovable": Shipped(
         "Two-finger gripper and a box on a floor, which slides and topples", "gripper_plant.movable"
     ),

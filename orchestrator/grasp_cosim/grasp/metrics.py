@@ -276,7 +276,60 @@ def _of_object(name: str, unit: str | None, output: str, label: str, description
 _of_object("object_tilt", "rad", "tilt", "object tilt", "Largest tilt of the object, either way.")
 _of_object("toppled", None, "toppled", "object toppled", "True if the object fell over.")
 _of_object("squeeze", "m", "squeeze", "object squeezed by", "Largest loss of width of the object.")
-_of_object("damaged", None, "damaged", "object damaged", "True if the object was squeezed too far.")
+_of_object(
+    "damaged", None, "damaged", "object damaged", "True if a limit of the object was exceeded."
+)
+_of_object(
+    "slip", "m", "slip", "object slipped by", "Largest way along the fingertips, either way."
+)
+_of_object("dropped", None, "dropped", "object dropped", "True if the object slipped out.")
+
+
+@of_grasp(
+    "peak_pressure",
+    "Pa",
+    needs={"plant.peak_pressure": "Pa"},
+    optional=True,
+    label="peak pressure",
+    factor=1e-3,
+    shown_unit="kPa",
+)
+def peak_pressure(signals: Signals) -> float:
+    """Highest pressure of a contact, also between two samples."""
+    return float(signals["plant.peak_pressure"][-1])
+
+
+OF_LIFT: Mapping[str, str | None] = {
+    f"plant.{name}[{j}]": "N" for name in ("friction_limit", "tangential_force") for j in FINGERS
+}
+
+
+@of_fingers(
+    "friction_margin", "1", needs=OF_LIFT, optional=True, none="nothing was lifted",
+    label="mu·N / |T|, at least",
+)  # fmt: skip
+def friction_margin(signals: Signals, finger: int) -> float | None:
+    """Smallest mu·N / |T| of a fingertip while it lifts; 1 where it slips, None if never."""
+    tangential = np.abs(signals[f"plant.tangential_force[{finger}]"])
+    lifts = tangential > 0.0
+    if not lifts.any():
+        return None
+    return float((signals[f"plant.friction_limit[{finger}]"][lifts] / tangential[lifts]).min())
+
+
+@of_grasp(
+    "lift_margin", "1", needs={**OF_LIFT, "plant.load": "N"}, optional=True,
+    none="nothing was lifted", label="2·mu·N / m(g + a), at least",
+)  # fmt: skip
+def lift_margin(signals: Signals) -> float | None:
+    """Smallest mu·(N_1 + N_2) / m·(g + a) while lifted; below 1 the object slips, None if never."""
+    load = signals["plant.load"]
+    lifted = load > 0.0
+    if not lifted.any():
+        return None
+    hold = signals["plant.friction_limit[1]"] + signals["plant.friction_limit[2]"]
+    return float((hold[lifted] / load[lifted]).min())
+
 
 METRICS = tuple(_metrics)
 """The metrics of a grasp, in the order in which they are shown."""

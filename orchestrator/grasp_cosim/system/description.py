@@ -49,8 +49,8 @@ class System(Structure):
     """A checked system: every name exists, every input has one source or keeps a value.
 
     It is made by System(...) in Python, by System.load() of a file, or by grasp_system(),
-    hand_system() and tandem_system(). It does not change: methods such as `with_values()` return
-    a copy.
+    hand_system(), tandem_system() and delicate_system(). It does not change: methods such as
+    `with_values()` return a copy.
 
     Example:
         >>> from grasp_cosim import System

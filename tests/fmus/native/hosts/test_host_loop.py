@@ -18,7 +18,23 @@ from support.platforms import host_of
 pytestmark = pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc")
 
 H = 1e-3
-PLANTS = ("GripperPlant", "GripperPlantCompliant", "GripperPlantMovable")
+PLANTS = (
+    "GripperPlant",
+    "GripperPlantCompliant",
+    "GripperPlantDelicate",
+    "GripperPlantMovable",
+)
+LIFT = {
+    "plant.initial_object_position": 0.02,
+    "plant.pad.stiffness": 4000.0,
+    "plant.pad.thickness": 0.002,
+    "plant.object_mass": 0.35,
+    "plant.object_height": 0.01,
+    "plant.impulse_limit": 0.01,
+    "plant.lift.enabled": True,
+    "plant.lift.time": 2.3,
+}
+"""A grasp that is lifted, slips and is dropped."""
 
 
 def same_bits(found, expected):
@@ -46,6 +62,7 @@ def started(grasp, script=None):
         *(slow(3000, 1e-3, plant, values) for plant in PLANTS for values in ({}, BENCH)),
         slow(30_000, 1e-4, "GripperPlantMovable", BENCH),
         slow(300, 0.01, "GripperPlantCompliant", BENCH),
+        (3000, 1e-3, "GripperPlantDelicate", LIFT),
     ],
 )
 def test_the_loop_is_that_of_the_blocks_to_the_bit(parts, host, tmp_path, steps, h, plant, values):
