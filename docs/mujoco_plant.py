@@ -28,6 +28,7 @@ from typing import Annotated, Any, NamedTuple
 from block_variables import Parameter
 from gripper_plant import box as standing
 from gripper_plant import fingers
+from gripper_plant.box import Outputs as Outputs
 from gripper_plant.box import Shape
 from gripper_plant.fingers import Inputs as Inputs
 from gripper_plant.fingers import Pair as Pair
@@ -87,6 +88,11 @@ class Params(standing.Params):
                     f"friction.static[{j}] = {static!r} N: must be from 0 to "
                     f"friction.coulomb[{j}], {coulomb:g}: MuJoCo has no breakaway force above it"
                 )
+        if self.friction.inner != (0.0, 0.0):
+            raise ValueError(
+                f"friction.inner = {self.friction.inner!r} N: must be 0: MuJoCo has the same "
+                "friction all along the way"
+            )
 
 
 class State(NamedTuple):
@@ -97,19 +103,6 @@ class State(NamedTuple):
     acceleration: Coordinates
     contact_force: Pair
     toppled: bool
-
-
-class Outputs(NamedTuple):
-    """Those of GripperPlantMovable, but for what MuJoCo does not tell between two timesteps."""
-
-    position: fingers.Position
-    velocity: fingers.Velocity
-    gap: fingers.Gap
-    contact_force: fingers.ContactForce
-    contact: fingers.Contact
-    object_position: fingers.ObjectPosition
-    tilt: standing.Tilt
-    toppled: standing.Toppled
 
 
 def initial_state(p: Params, u: Inputs) -> State:
