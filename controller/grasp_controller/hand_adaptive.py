@@ -219,7 +219,7 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
 
 
 def brightnesses(p: Params, lines: Lines) -> Brightness:
-    """What the lines tell of the faces' reflectances to their mean.
+    """The reflectances of the faces to their mean, by the lines.
 
     All are zero before there is a slope.
     """
