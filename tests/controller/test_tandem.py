@@ -16,7 +16,11 @@ from scipy.integrate import solve_ivp
 from support.approach import ANY_SAMPLES, H, N, approach, intensity, mirrored, numbers, pairs
 from support.marks import examples
 
-SURE = Params(reflectance=reflectance_ratio.Params(intensity_noise=1e-12))
+SURE = Params(
+    reflectance=reflectance_ratio.Params(
+        intensity_noise=1e-12, exponent_deviation=0.0, offset_deviation=0.0
+    )
+)
 """Of what it has learnt."""
 
 UNLEARNT = Params(reflectance=reflectance_ratio.Params(prior_deviation=0.0))
