@@ -52,7 +52,10 @@ def seen_off(off, gap, n=N):
 def test_the_target_is_the_middle_to_first_order(gap, share, n):
     """By Eq. (9) d·tanh(rho)/n = e·(1 - c·(e/d)^2) with |c| < 1 + n^2: second order is none."""
     learning = reflectance_ratio.Params(
-        diffusion_exponent=(n, n), gain=(0.0024 * 0.1 ** (n - N),) * 2, prior_deviation=0.0
+        diffusion_exponent=(n, n),
+        gain=(0.0024 * 0.1 ** (n - N),) * 2,
+        prior_deviation=0.0,
+        intensity_noise=1e-12,
     )
     off = share * gap
     u = seen_off(off, gap, n)
