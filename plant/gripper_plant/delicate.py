@@ -356,7 +356,7 @@ def _holds(p: Params, contact_force: Pair) -> Pair:
 def _floor(p: Params, x: State) -> friction.Law:
     """The friction of the floor under the object, none in the air."""
     grip = p.floor_friction * hanging.floor_force(p.object_mass, x.height, x.load)
-    return grip, grip, 0.0, 1.0  # (F1)
+    return friction.coulomb(grip)  # (F1)
 
 
 def _rate(p: Params, x: State, u: Inputs, h: float) -> float:
