@@ -28,7 +28,6 @@ from typing import Annotated, Any, NamedTuple
 from block_variables import Parameter
 from gripper_plant import box as standing
 from gripper_plant import fingers
-from gripper_plant.box import Outputs as Outputs
 from gripper_plant.box import Shape
 from gripper_plant.fingers import Inputs as Inputs
 from gripper_plant.fingers import Pair as Pair
@@ -103,6 +102,19 @@ class State(NamedTuple):
     acceleration: Coordinates
     contact_force: Pair
     toppled: bool
+
+
+class Outputs(NamedTuple):
+    """Those of GripperPlantMovable, but for what MuJoCo does not tell between two timesteps."""
+
+    position: fingers.Position
+    velocity: fingers.Velocity
+    gap: fingers.Gap
+    contact_force: fingers.ContactForce
+    contact: fingers.Contact
+    object_position: fingers.ObjectPosition
+    tilt: standing.Tilt
+    toppled: standing.Toppled
 
 
 def initial_state(p: Params, u: Inputs) -> State:

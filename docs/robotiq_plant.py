@@ -34,7 +34,6 @@ from gripper_plant import box as standing
 from gripper_plant import command_delay, fingers, tandem, wrist
 from gripper_plant.command_delay import Line
 from gripper_plant.tandem import Inputs as Inputs
-from gripper_plant.tandem import Outputs as Outputs
 from gripper_plant.wrist import Wrist
 
 REQUIRES = ("mujoco",)
@@ -148,6 +147,22 @@ class State(NamedTuple):
     seen: Numbers
     toppled: bool
     line: Line
+
+
+class Outputs(NamedTuple):
+    """Those of TandemPlant, but for what MuJoCo does not tell between two timesteps."""
+
+    position: fingers.Position
+    velocity: fingers.Velocity
+    gap: fingers.Gap
+    contact_force: fingers.ContactForce
+    contact: fingers.Contact
+    object_position: fingers.ObjectPosition
+    tilt: standing.Tilt
+    toppled: standing.Toppled
+    wrist_position: tandem.WristPosition
+    wrist_velocity: tandem.WristVelocity
+    wrist_force: tandem.WristForce
 
 
 def initial_state(p: Params, u: Inputs) -> State:

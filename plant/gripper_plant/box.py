@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple, TypeAlias
 
 from block_variables import Output, Parameter
 
-from . import fingers, friction
-from .contact import time_to_contact
+from . import fingers, friction, touch
 
 GRAVITY = 9.80665
 """m/s^2."""
@@ -94,6 +93,11 @@ class Outputs(NamedTuple):
     object_position: fingers.ObjectPosition
     tilt: Tilt
     toppled: Toppled
+    contact_impulse: touch.ContactImpulse
+    first_contact_time: touch.FirstContactTime
+    impact_velocity: touch.ImpactVelocity
+    touched: touch.Touched
+    impact_impulse: touch.ImpactImpulse
 
 
 class Shape(NamedTuple):
@@ -159,6 +163,18 @@ def faces(q: Shape, box: Box) -> tuple[float, float]:
     return box.x - q.b + lean + width, box.x - q.b + lean
 
 
+def face_speeds(q: Shape, box: Box) -> tuple[float, float]:
+    """How fast the right and the left face move where the fingertips meet them, m/s."""
+    if box.tilt == 0.0:
+        return box.v, box.v
+    cos_squared = cos(box.tilt) * cos(box.tilt)
+    leaning = box.v + q.h * box.w / cos_squared
+    widening = 2.0 * q.b * sin(box.tilt) * box.w / cos_squared
+    if box.tilt > 0.0:
+        return leaning, leaning - widening
+    return leaning + widening, leaning
+
+
 def energy(q: Shape, box: Box) -> float:
     """Of the motion and of the height above that of the flat box, J."""
     x, z = _arms(q, abs(box.tilt))
@@ -222,7 +238,7 @@ def _turn_about_edge(q: Shape, box: Box, push: Pushes, d: float) -> tuple[Box, f
         next_box, theta_ddot = _midpoint_step(q, box, push, slip, used)
         next_box = Box(next_box.x, next_box.tilt, 0.0, next_box.w)
     if next_box.tilt <= 0.0 and (box.tilt > 0.0 or next_box.tilt < 0.0):
-        used = min(used, time_to_contact(box.tilt, box.w, theta_ddot))
+        used = min(used, touch.time_to_contact(box.tilt, box.w, theta_ddot))
         next_box, _ = _midpoint_step(q, box, push, slip, used)
         next_box = _land(q, next_box)
     return next_box, used

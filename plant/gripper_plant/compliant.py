@@ -9,11 +9,12 @@ from typing import Annotated, NamedTuple
 
 from block_variables import Output, Parameter
 
-from . import contact_laws, fingers, friction
+from . import contact_laws, fingers, friction, touch
 from .contact_laws import HuntCrossley, KelvinVoigt
 from .fingers import Inputs as Inputs
 from .fingers import Pair as Pair
 from .fingers import Side
+from .touch import Clock, Touch, TouchPair
 
 LONGEST_STEP = fingers.LONGEST_STEP
 
@@ -36,12 +37,16 @@ class Params(fingers.Params, contact_laws.Giving):
 
 
 class State(NamedTuple):
-    """Fingertip positions in m, velocities in m/s, contact forces in N; damaged so far."""
+    """Fingertip positions in m, velocities in m/s, contact forces in N; damaged so far; touches
+    and time.
+    """
 
     position: Pair
     velocity: Pair
     contact_force: Pair
     damaged: bool
+    touch: TouchPair
+    clock: Clock
 
 
 class Outputs(NamedTuple):
@@ -63,11 +68,18 @@ class Outputs(NamedTuple):
         ),
     ]
     damaged: Annotated[bool, Output("the squeeze has been above its limit", depends_on=set())]
+    contact_impulse: touch.ContactImpulse
+    first_contact_time: touch.FirstContactTime
+    impact_velocity: touch.ImpactVelocity
+    touched: touch.Touched
+    impact_impulse: touch.ImpactImpulse
 
 
 def initial_state(p: Params, u: Inputs) -> State:
     """Both fingers at rest at their initial positions, free of the object."""
-    return State(p.initial_position, (0.0, 0.0), (0.0, 0.0), False)
+    return State(
+        p.initial_position, (0.0, 0.0), (0.0, 0.0), False, fingers.initial_touch(p), touch.START
+    )
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
@@ -81,12 +93,23 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     u_1, u_2 = fingers.forces(p.actuator, u)
     right, left = p.sides
     s_2, v_2, u_2, f_2, damaged = -x_2, -v_2, -u_2, -f_2, x.damaged
-    for _ in range(n):
-        x_1, v_1, f_1 = _press(right, p.law, x_1, v_1, u_1, h / n, f_1)
-        s_2, v_2, f_2 = _press(left, p.law, s_2, v_2, u_2, h / n, f_2)
+    touch_1 = touch.from_point(x.touch[0], x_1 <= right.surface)
+    touch_2 = touch.from_point(x.touch[1], s_2 <= left.surface)
+    d = h / n
+    for i in range(n):
+        begin = x.clock.seconds + i * d
+        x_1, v_1, f_1, touch_1 = _press(right, p.law, x_1, v_1, u_1, d, f_1, touch_1, begin)
+        s_2, v_2, f_2, touch_2 = _press(left, p.law, s_2, v_2, u_2, d, f_2, touch_2, begin)
         squeeze = _squeeze(x_1 - right.surface, s_2 - left.surface)
         damaged = damaged or squeeze > p.squeeze_limit
-    return State((x_1, -s_2), (v_1, 0.0 - v_2), (f_1, 0.0 - f_2), damaged)
+    return State(
+        (x_1, -s_2),
+        (v_1, 0.0 - v_2),
+        (f_1, 0.0 - f_2),
+        damaged,
+        (touch_1, touch_2),
+        touch.later(x.clock, h),
+    )
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
@@ -94,6 +117,7 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     x_1, x_2 = x.position
     (right, _, _), (left, _, _) = p.sides
     gap_1, gap_2 = x_1 - right, -x_2 - left
+    right_touch, left_touch = x.touch
     return Outputs(
         x.position,
         x.velocity,
@@ -103,15 +127,29 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
         p.initial_object_position,
         _squeeze(gap_1, gap_2),
         x.damaged,
+        (right_touch.impulse, 0.0 - left_touch.impulse),
+        (right_touch.first_time, left_touch.first_time),
+        (right_touch.speed, left_touch.speed),
+        (right_touch.touched, left_touch.touched),
+        (right_touch.impact, 0.0 - left_touch.impact),
     )
 
 
 def _press(
-    side: Side, law: contact_laws.Law, s: float, v: float, f: float, d: float, guess: float
-) -> tuple[float, float, float]:
+    side: Side,
+    law: contact_laws.Law,
+    s: float,
+    v: float,
+    f: float,
+    d: float,
+    guess: float,
+    felt: Touch,
+    begin: float,
+) -> tuple[float, float, float, Touch]:
     """Position in m and velocity in m/s of a finger after d seconds, contact force in N over them.
 
     The force and the way that the finger goes under it are found by iteration, from a guess in N.
+    The d seconds begin at `begin` s since the start; what the finger has felt goes on.
     """
     surface, m, friction_law = side
     contact_force, next_s, next_v = guess, s, v
@@ -121,7 +159,13 @@ def _press(
         if contact_laws.settled(new_force, contact_force):
             break
         contact_force = new_force
-    return next_s, next_v, contact_force
+    if touch.touches(s - surface, next_s - surface, contact_force):
+        if felt.first_time < 0.0:
+            free_s, _ = friction.move(s, v, m, f, friction_law, d)
+            moment, speed = touch.meeting(s - surface, v, free_s - surface, d)
+            felt = touch.met(felt, begin + moment, speed)
+        felt = touch.pressed(felt, begin, d, contact_force)
+    return next_s, next_v, contact_force, felt
 
 
 def _rate(p: Params, x: State, u: Inputs, h: float) -> float:

@@ -11,12 +11,13 @@ from typing import Annotated, NamedTuple
 
 from block_variables import Output, Parameter
 
-from . import box, contact_laws, damage, fingers, friction, zener
+from . import box, contact_laws, damage, fingers, friction, touch, zener
 from . import lift as hanging
 from .damage import Blow, Limits
 from .fingers import Inputs as Inputs
 from .fingers import Pair as Pair
 from .lift import Height, Lift, Load
+from .touch import Clock, TouchPair
 from .zener import Pad, Side, Solid
 
 LONGEST_STEP = fingers.LONGEST_STEP
@@ -105,7 +106,7 @@ class Params(fingers.Params):
 class State(NamedTuple):
     """Fingertips in m, m/s, N; the ways z of the dashpots in m; the object's middle in m, m/s.
 
-    Then heights and load, blows, the time in s, the highest contact force in N, what has happened.
+    Then heights and load, blows, the highest contact force in N, what has happened, touches, time.
     """
 
     position: Pair
@@ -117,10 +118,11 @@ class State(NamedTuple):
     load: Load
     blow_1: Blow
     blow_2: Blow
-    time: float
     peak_force: float
     damaged: bool
     dropped: bool
+    touch: TouchPair
+    clock: Clock
 
 
 class Outputs(NamedTuple):
@@ -192,6 +194,11 @@ class Outputs(NamedTuple):
             unit="m", nominal=0.1, depends_on=set(),
         ),
     ]  # fmt: skip
+    contact_impulse: touch.ContactImpulse
+    first_contact_time: touch.FirstContactTime
+    impact_velocity: touch.ImpactVelocity
+    touched: touch.Touched
+    impact_impulse: touch.ImpactImpulse
 
 
 def initial_state(p: Params, u: Inputs) -> State:
@@ -207,9 +214,10 @@ def initial_state(p: Params, u: Inputs) -> State:
         damage.NO_BLOW,
         damage.NO_BLOW,
         0.0,
-        0.0,
         False,
         False,
+        fingers.initial_touch(p),
+        touch.START,
     )
 
 
@@ -219,30 +227,33 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     if n > fingers.MAX_SUBSTEPS:
         return x._replace(position=fingers.UNRESOLVED)
     forces = fingers.forces(p.actuator, u)
-    begin = x.time
+    touches_1, touches_2 = _touches(p, x)
+    touch_1, touch_2 = x.touch
+    x = x._replace(
+        touch=(touch.from_point(touch_1, touches_1), touch.from_point(touch_2, touches_2))
+    )
+    d = h / n
     for k in range(n):
-        lifting = p.lift.enabled and begin + k * (h / n) >= p.lift.time - 1e-9
-        x = _substep(p, x, forces, lifting, h / n)
-    return x._replace(time=begin + h)
+        begin = x.clock.seconds + k * d
+        lifting = p.lift.enabled and begin >= p.lift.time - 1e-9
+        x = _substep(p, x, forces, lifting, d, begin)
+    return x._replace(clock=touch.later(x.clock, h))
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """The outputs, as the sensors see them; no input reaches an output without a step."""
     depth_1, depth_2 = _depths(p, x.position, x.object[0])
     z_1, z_2 = x.dashpot
-    touches = not x.dropped
+    right_touch, left_touch = x.touch
     hold_1, hold_2 = _holds(p, x.contact_force)
     return Outputs(
         x.position,
         x.velocity,
         (_gap(p, depth_1, z_1, x.dropped), _gap(p, depth_2, z_2, x.dropped)),
         x.contact_force,
-        (
-            touches and depth_1 >= zener.surface(p.law, z_1),
-            touches and depth_2 >= zener.surface(p.law, z_2),
-        ),
+        _touches(p, x),
         x.object[0],
-        _dent(p, depth_1, z_1) + _dent(p, depth_2, z_2) if touches else 0.0,
+        _dent(p, depth_1, z_1) + _dent(p, depth_2, z_2) if not x.dropped else 0.0,
         x.damaged,
         x.peak_force,
         x.peak_force / p.contact_area,
@@ -252,11 +263,32 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
         hanging.slip(x.height),
         x.dropped,
         x.height.tips,
+        (right_touch.impulse, 0.0 - left_touch.impulse),
+        (right_touch.first_time, left_touch.first_time),
+        (right_touch.speed, left_touch.speed),
+        (right_touch.touched, left_touch.touched),
+        (right_touch.impact, 0.0 - left_touch.impact),
     )
 
 
-def _substep(p: Params, x: State, forces: Pair, lifting: bool, d: float) -> State:
-    """D seconds with the contact forces held; they and the ways under them found by iteration."""
+def _touches(p: Params, x: State) -> tuple[bool, bool]:
+    """Whether each fingertip is at its face, or in it."""
+    gap_1, gap_2 = _free_gaps(p, x.position, x.object[0], x.dashpot)
+    return not x.dropped and gap_1 <= 0.0, not x.dropped and gap_2 <= 0.0
+
+
+def _free_gaps(p: Params, position: Pair, middle: float, dashpots: Pair) -> Pair:
+    """From each tip to its free face, m; below 0 inside. The object's middle is there in m."""
+    depth_1, depth_2 = _depths(p, position, middle)
+    z_1, z_2 = dashpots
+    return zener.surface(p.law, z_1) - depth_1, zener.surface(p.law, z_2) - depth_2
+
+
+def _substep(p: Params, x: State, forces: Pair, lifting: bool, d: float, begin: float) -> State:
+    """D seconds from `begin` in s on with the contact forces held.
+
+    They and the ways under them are found by iteration.
+    """
     (_, m_1, friction_1), (_, m_2, friction_2) = p.sides
     x_1, x_2 = x.position
     v_1, v_2 = x.velocity
@@ -278,6 +310,8 @@ def _substep(p: Params, x: State, forces: Pair, lifting: bool, d: float) -> Stat
             break
         f_1, f_2 = new_f_1, new_f_2
     contact_force = (f_1, 0.0 - f_2)
+    next_gaps = _free_gaps(p, (s_1, -s_2), middle, (next_z_1, next_z_2))
+    felt = _felt(p, x, forces, (f_1, f_2), next_gaps, d, begin)
     tips = hanging.rise(p.lift, x.height, lifting, d)
     height, load = hanging.carry(p.object_mass, x.height, tips, _holds(p, contact_force), d)
     moved = x._replace(
@@ -288,9 +322,51 @@ def _substep(p: Params, x: State, forces: Pair, lifting: bool, d: float) -> Stat
         object=(middle, speed),
         height=height,
         load=hanging.NO_LOAD if x.dropped else load,
+        touch=felt,
         dropped=x.dropped or abs(hanging.slip(height)) > 0.5 * p.object_height,
     )
     return _worn(p, moved, d)
+
+
+def _felt(
+    p: Params,
+    x: State,
+    forces: Pair,
+    contact_forces: Pair,
+    next_gaps: Pair,
+    d: float,
+    begin: float,
+) -> TouchPair:
+    """What the fingers have felt d seconds after `begin` in s, with contact forces in N over them.
+
+    next_gaps in m are those at the end. A first contact is met at the speed relative to the object,
+    which only the other finger pushes until then.
+    """
+    touch_1, touch_2 = x.touch
+    if x.dropped:
+        return x.touch
+    (_, m_1, friction_1), (_, m_2, friction_2) = p.sides
+    (x_1, x_2), (v_1, v_2), (u_1, u_2) = x.position, x.velocity, forces
+    (f_1, f_2), (middle, speed) = contact_forces, x.object
+    gap_1, gap_2 = _free_gaps(p, x.position, middle, x.dashpot)
+    floor = _floor(p, x)
+    if touch.touches(gap_1, next_gaps[0], f_1):
+        if touch_1.first_time < 0.0:
+            free_s, _ = friction.move(x_1, v_1, m_1, u_1, friction_1, d)
+            pushed, _ = friction.move(middle, speed, p.object_mass, f_2, floor, d)
+            free_gap = gap_1 + (free_s - x_1) - (pushed - middle)
+            moment, closing = touch.meeting(gap_1, v_1 - speed, free_gap, d)
+            touch_1 = touch.met(touch_1, begin + moment, closing)
+        touch_1 = touch.pressed(touch_1, begin, d, f_1)
+    if touch.touches(gap_2, next_gaps[1], f_2):
+        if touch_2.first_time < 0.0:
+            free_s, _ = friction.move(x_2, v_2, m_2, u_2, friction_2, d)
+            pushed, _ = friction.move(middle, speed, p.object_mass, 0.0 - f_1, floor, d)
+            free_gap = gap_2 - (free_s - x_2) + (pushed - middle)
+            moment, closing = touch.meeting(gap_2, speed - v_2, free_gap, d)
+            touch_2 = touch.met(touch_2, begin + moment, closing)
+        touch_2 = touch.pressed(touch_2, begin, d, f_2)
+    return touch_1, touch_2
 
 
 def _worn(p: Params, x: State, d: float) -> State:

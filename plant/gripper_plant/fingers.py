@@ -14,6 +14,7 @@ from block_variables import Group, Input, Output, Parameter, check
 
 from . import friction as finger_friction
 from .friction import Pair as Pair
+from .touch import TouchPair, initial
 
 LONGEST_STEP = 2.0
 """s, of every plant; a longer communication step is discarded."""
@@ -163,6 +164,12 @@ ObjectPosition: TypeAlias = Annotated[
     float, Output("centre of the object", unit="m", nominal=0.1, depends_on=set())
 ]
 """The outputs of every plant, in this order."""
+
+
+def initial_touch(p: Place) -> TouchPair:
+    """Of both fingers at the start, where one that touches has no impact."""
+    (x_1, x_2), x_m, half = p.initial_position, p.initial_object_position, 0.5 * p.object_width
+    return initial(x_1 <= half + x_m), initial(-x_2 <= half - x_m)
 
 
 def forces(p: Actuator, u: Inputs) -> Pair:

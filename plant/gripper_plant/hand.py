@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
-from . import contact, fingers, friction, hand_fingers, rigid
+from . import contact, fingers, friction, hand_fingers, rigid, touch
 from .fingers import Side
 from .hand_fingers import Inputs as Inputs
 from .hand_fingers import Outputs as Outputs
-from .hand_fingers import PerFinger
+from .hand_fingers import PerFinger, TouchOfEach
 from .hand_size import FINGERS
+from .touch import Clock
 
 LONGEST_STEP = fingers.LONGEST_STEP
 
@@ -44,28 +45,39 @@ class Params(hand_fingers.Params):
 
 
 class State(NamedTuple):
-    """Fingertip positions in m, velocities in m/s and contact forces in N."""
+    """Fingertip positions in m, velocities in m/s, contact forces in N; touches, and the time."""
 
     position: PerFinger
     velocity: PerFinger
     contact_force: PerFinger
+    touch: TouchOfEach
+    clock: Clock
 
 
 def initial_state(p: Params, u: Inputs) -> State:
     """All fingers at rest at their initial positions, free of the object."""
-    return State(p.initial_position, hand_fingers.ZEROS, hand_fingers.ZEROS)
+    felt = tuple(
+        touch.initial(s <= surface)
+        for s, surface in zip(p.initial_position, p.surfaces, strict=True)
+    )
+    zeros = hand_fingers.ZEROS
+    return State(p.initial_position, zeros, zeros, felt, touch.START)
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance all fingers by h seconds (h > 0), the forces held."""
     moved_fingers = tuple(
-        contact.advance(side, p.rates, s, v, f, h)
-        for side, s, v, f in zip(p.sides, x.position, x.velocity, u.force, strict=True)
+        contact.advance(side, p.rates, s, v, f, h, felt, x.clock.seconds)
+        for side, s, v, f, felt in zip(
+            p.sides, x.position, x.velocity, u.force, x.touch, strict=True
+        )
     )
     return State(
-        tuple(s for s, _, _ in moved_fingers),
-        tuple(v for _, v, _ in moved_fingers),
-        tuple(f for _, _, f in moved_fingers),
+        tuple(finger.s for finger in moved_fingers),
+        tuple(finger.v for finger in moved_fingers),
+        tuple(finger.force for finger in moved_fingers),
+        tuple(finger.touch for finger in moved_fingers),
+        touch.later(x.clock, h),
     )
 
 
@@ -80,4 +92,9 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
         tuple(gap <= 0.0 for gap in gaps),
         p.initial_object_position,
         p.initial_object_angle,
+        tuple(felt.impulse for felt in x.touch),
+        tuple(felt.first_time for felt in x.touch),
+        tuple(felt.speed for felt in x.touch),
+        tuple(felt.touched for felt in x.touch),
+        tuple(felt.impact for felt in x.touch),
     )

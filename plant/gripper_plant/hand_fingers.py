@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from block_variables import Input, Output, Parameter, check
 
 from .hand_size import FINGERS
+from .touch import Touch
 
 MIN_FACING = 0.1
 """Cosine of a prism's turn below which its faces do not look to the rays any more."""
@@ -64,10 +65,12 @@ if TYPE_CHECKING:
     PerFinger = tuple[float, ...]
     Touches = tuple[bool, ...]
     Rays = tuple[Ray, ...]
+    TouchOfEach = tuple[Touch, ...]
 else:
     PerFinger = tuple[(float,) * FINGERS]
     Touches = tuple[(bool,) * FINGERS]
     Rays = tuple[(Ray,) * FINGERS]
+    TouchOfEach = tuple[(Touch,) * FINGERS]
 
 Plane = tuple[float, float]
 """x and y in the plane of the rays, the wrist at the origin."""
@@ -273,6 +276,49 @@ class Outputs(NamedTuple):
             "theta, turn of the object, counter-clockwise",
             unit="rad",
             nominal=0.1,
+            depends_on=set(),
+        ),
+    ]
+    contact_impulse: Annotated[
+        PerFinger,
+        Output(
+            "impulse of the contact force since the start",
+            unit="N.s",
+            nominal=0.01,
+            depends_on=set(),
+        ),
+    ]
+    first_contact_time: Annotated[
+        PerFinger,
+        Output(
+            "time of the first contact since the start; -1 before",
+            unit="s",
+            nominal=1.0,
+            depends_on=set(),
+        ),
+    ]
+    impact_velocity: Annotated[
+        PerFinger,
+        Output(
+            "rate at which the gap closed at the first contact; 0 before",
+            unit="m/s",
+            nominal=0.1,
+            depends_on=set(),
+        ),
+    ]
+    touched: Annotated[
+        Touches,
+        Output(
+            "the finger touched since the last communication point, or touches now",
+            depends_on=set(),
+        ),
+    ]
+    impact_impulse: Annotated[
+        PerFinger,
+        Output(
+            "impulse of the contact force within 20 ms from the first contact",
+            unit="N.s",
+            nominal=0.01,
             depends_on=set(),
         ),
     ]

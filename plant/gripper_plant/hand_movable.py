@@ -14,14 +14,15 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from block_variables import Parameter
 
-from . import contact_laws, fingers, friction, hand_fingers
+from . import contact_laws, fingers, friction, hand_fingers, touch
 from .box import GRAVITY
 from .contact_laws import HuntCrossley, KelvinVoigt
-from .hand_fingers import FAR, Normal, PerFinger, Pose, Rays, Touches
+from .hand_fingers import FAR, Normal, PerFinger, Pose, Ray, Rays, Touches, TouchOfEach
 from .hand_fingers import Inputs as Inputs
 from .hand_fingers import Outputs as Outputs
 from .hand_size import FINGERS
 from .movable import MAX_FORCE_ITERATIONS
+from .touch import Clock, Touch
 
 LONGEST_STEP = fingers.LONGEST_STEP
 
@@ -90,7 +91,7 @@ class Body(NamedTuple):
 
 
 class State(NamedTuple):
-    """Fingertip positions in m, velocities in m/s, normal forces in N; the object.
+    """Fingertip positions in m, velocities in m/s, normal forces in N; the object; touches, time.
 
     A finger that is below a face and not `inside` has come there around an edge, and touches
     nothing.
@@ -101,13 +102,17 @@ class State(NamedTuple):
     normal_force: PerFinger
     inside: Touches
     body: Body
+    touch: TouchOfEach
+    clock: Clock
 
 
 def initial_state(p: Params, u: Inputs) -> State:
     """All at rest, the fingers free of the object."""
     body = Body(p.first_pose, 0.0, 0.0, 0.0)
     zeros, outside = hand_fingers.ZEROS, hand_fingers.OUTSIDE
-    return State(p.initial_position, zeros, zeros, outside, body)
+    felt = tuple(touch.initial(False) for _ in p.rays)
+    x = State(p.initial_position, zeros, zeros, outside, body, felt, touch.START)
+    return x._replace(touch=tuple(touch.initial(n.depth >= 0.0) for n in _normals(p, p.rays, x)))
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
@@ -116,9 +121,16 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     n = fingers.substep_count(_rate(p, rays, x, u, h), h)
     if n > fingers.MAX_SUBSTEPS:
         return x._replace(position=hand_fingers.UNRESOLVED)
-    for _ in range(n):
-        x = _substep(p, rays, x, u.force, h / n)
-    return x
+    touching = tuple(normal.depth >= 0.0 for normal in _normals(p, rays, x))
+    x = x._replace(
+        touch=tuple(
+            touch.from_point(felt, touches) for felt, touches in zip(x.touch, touching, strict=True)
+        )
+    )
+    d = h / n
+    for i in range(n):
+        x = _substep(p, rays, x, u.force, d, x.clock.seconds + i * d)
+    return x._replace(clock=touch.later(x.clock, h))
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
@@ -145,6 +157,11 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
         tuple(normal.depth >= 0.0 for normal in normals),
         (pose.x, pose.y),
         pose.angle,
+        tuple(felt.impulse for felt in x.touch),
+        tuple(felt.first_time for felt in x.touch),
+        tuple(felt.speed for felt in x.touch),
+        tuple(felt.touched for felt in x.touch),
+        tuple(felt.impact for felt in x.touch),
     )
 
 
@@ -171,8 +188,11 @@ def _raw_normals(p: Params, rays: Rays, x: State) -> Normals:
     )
 
 
-def _substep(p: Params, rays: Rays, x: State, u: PerFinger, d: float) -> State:
-    """D seconds with the normal forces held, found by iteration along the normals at the start."""
+def _substep(p: Params, rays: Rays, x: State, u: PerFinger, d: float, begin: float) -> State:
+    """D seconds from `begin` in s on with the normal forces held.
+
+    They are found by iteration, along the normals at the start.
+    """
     normals = _normals(p, rays, x)
     ray_shares = tuple(
         normal.x * ray.x + normal.y * ray.y for normal, ray in zip(normals, rays, strict=True)
@@ -187,7 +207,7 @@ def _substep(p: Params, rays: Rays, x: State, u: PerFinger, d: float) -> State:
             )
         )
         tips, rates = tuple(s for s, _ in moved_fingers), tuple(v for _, v in moved_fingers)
-        next_state = State(tips, rates, forces, x.inside, body)
+        next_state = State(tips, rates, forces, x.inside, body, x.touch, x.clock)
         next_normals = _raw_normals(p, rays, next_state)
         new_forces = tuple(
             0.0
@@ -202,7 +222,96 @@ def _substep(p: Params, rays: Rays, x: State, u: PerFinger, d: float) -> State:
         normal.depth >= 0.0 and (was_inside or normal.depth <= SHALLOW)
         for normal, was_inside in zip(_raw_normals(p, rays, next_state), x.inside, strict=True)
     )
-    return next_state._replace(inside=inside)
+    felt = _felt(p, rays, x, next_state, normals, ray_shares, u, d, begin)
+    return next_state._replace(inside=inside, touch=felt)
+
+
+def _felt(
+    p: Params,
+    rays: Rays,
+    x: State,
+    next_state: State,
+    normals: Normals,
+    ray_shares: PerFinger,
+    u: PerFinger,
+    d: float,
+    begin: float,
+) -> TouchOfEach:
+    """What the fingers have felt after the d seconds from `begin` in s on, from x to next_state."""
+    forces = next_state.normal_force
+    touching = tuple(
+        touch.touches(-normal.depth, -next_normal.depth, f)
+        for normal, next_normal, f in zip(
+            normals, _normals(p, rays, next_state), forces, strict=True
+        )
+    )
+    felt = x.touch
+    if any(
+        touches and one.first_time < 0.0 for touches, one in zip(touching, x.touch, strict=True)
+    ):
+        felt = _met(p, rays, x, normals, touching, forces, u, d, begin)
+    return tuple(
+        touch.pressed(one, begin, d, f * share) if touches else one
+        for one, touches, f, share in zip(felt, touching, forces, ray_shares, strict=True)
+    )
+
+
+def _met(
+    p: Params,
+    rays: Rays,
+    x: State,
+    normals: Normals,
+    touching: Touches,
+    forces: PerFinger,
+    u: PerFinger,
+    d: float,
+    begin: float,
+) -> TouchOfEach:
+    """The touches after the first contacts within the d seconds from `begin` in s on.
+
+    The way until then is that without them: of the finger, and of the object under the other
+    forces. The gap along the ray closes by the depth's rate over nu·e.
+    """
+    old_forces = tuple(
+        0.0 if touches and felt.first_time < 0.0 else f
+        for touches, felt, f in zip(touching, x.touch, forces, strict=True)
+    )
+    body = _advance_object(p, rays, x, normals, old_forces, d)
+    free_tips = tuple(
+        friction.move(s, v, m, f, friction.NONE, d)[0]
+        for s, v, m, f in zip(x.position, x.velocity, p.finger_mass, u, strict=True)
+    )
+    free_normals = _raw_normals(p, rays, x._replace(position=free_tips, body=body))
+    return tuple(
+        _met_one(ray, x.body, s, v, normal, free_normal, felt, d, begin) if touches else felt
+        for ray, s, v, normal, free_normal, felt, touches in zip(
+            rays, x.position, x.velocity, normals, free_normals, x.touch, touching, strict=True
+        )
+    )
+
+
+def _met_one(
+    ray: Ray,
+    body: Body,
+    s: float,
+    v: float,
+    normal: Normal,
+    free_normal: Normal,
+    felt: Touch,
+    d: float,
+    begin: float,
+) -> Touch:
+    """The touch of a finger at s m with v m/s that comes down to free_normal within d seconds."""
+    arm_x, arm_y = s * ray.x - body.pose.x, s * ray.y - body.pose.y
+    of_object = normal.x * (body.x_dot - body.turning * arm_y) + normal.y * (
+        body.y_dot + body.turning * arm_x
+    )
+    share = normal.x * ray.x + normal.y * ray.y
+    rate = share * v - of_object
+    moment, speed = d, -rate  # of one that comes to a face from its end
+    if normal.depth > -FAR and free_normal.depth > -FAR:
+        moment, speed = touch.meeting(-normal.depth, rate, -free_normal.depth, d)
+    return touch.met(felt, begin + moment, speed / share if share > 0.0 else 0.0)
 
 
 def _advance_object(

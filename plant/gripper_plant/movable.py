@@ -9,12 +9,13 @@ from functools import cached_property
 from typing import NamedTuple
 
 from . import box as standing
-from . import contact_laws, fingers, friction
+from . import contact_laws, fingers, friction, touch
 from .box import Box, Pushes, Shape
 from .box import Outputs as Outputs
 from .contact_laws import HuntCrossley, KelvinVoigt
 from .fingers import Inputs as Inputs
 from .fingers import Pair as Pair
+from .touch import Clock, TouchPair
 
 LONGEST_STEP = fingers.LONGEST_STEP
 
@@ -36,19 +37,31 @@ class Params(standing.Params, contact_laws.Giving):
 
 
 class State(NamedTuple):
-    """Fingertip positions in m, velocities in m/s, contact forces in N; the box; toppled so far."""
+    """Fingertip positions in m, velocities in m/s, contact forces in N; the box; toppled so far;
+    touches, and the time.
+    """
 
     position: Pair
     velocity: Pair
     contact_force: Pair
     box: Box
     toppled: bool
+    touch: TouchPair
+    clock: Clock
 
 
 def initial_state(p: Params, u: Inputs) -> State:
     """All at rest, the fingers free of the object."""
     box = Box(p.initial_object_position, 0.0, 0.0, 0.0)
-    return State(p.initial_position, (0.0, 0.0), (0.0, 0.0), box, False)
+    return State(
+        p.initial_position,
+        (0.0, 0.0),
+        (0.0, 0.0),
+        box,
+        False,
+        fingers.initial_touch(p),
+        touch.START,
+    )
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
@@ -58,9 +71,15 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     if n > fingers.MAX_SUBSTEPS:
         return x._replace(position=fingers.UNRESOLVED)
     forces = fingers.forces(p.actuator, u)
-    for _ in range(n):
-        x = _substep(p, q, x, forces, h / n)
-    return x
+    (right, left), (x_1, x_2) = standing.faces(q, x.box), x.position
+    touch_1, touch_2 = x.touch
+    x = x._replace(
+        touch=(touch.from_point(touch_1, x_1 <= right), touch.from_point(touch_2, x_2 >= left))
+    )
+    d = h / n
+    for i in range(n):
+        x = _substep(p, q, x, forces, d, x.clock.seconds + i * d)
+    return x._replace(clock=touch.later(x.clock, h))
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
@@ -68,6 +87,7 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     x_1, x_2 = x.position
     q = standing.shape(p)
     right, left = standing.faces(q, x.box)
+    right_touch, left_touch = x.touch
     return Outputs(
         x.position,
         x.velocity,
@@ -77,11 +97,19 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
         standing.centre(q, x.box),
         x.box.tilt,
         x.toppled,
+        (right_touch.impulse, 0.0 - left_touch.impulse),
+        (right_touch.first_time, left_touch.first_time),
+        (right_touch.speed, left_touch.speed),
+        (right_touch.touched, left_touch.touched),
+        (right_touch.impact, 0.0 - left_touch.impact),
     )
 
 
-def _substep(p: Params, q: Shape, x: State, forces: Pair, d: float) -> State:
-    """D seconds with the contact forces held; they and the ways under them found by iteration."""
+def _substep(p: Params, q: Shape, x: State, forces: Pair, d: float, begin: float) -> State:
+    """D seconds from `begin` in s on with the contact forces held.
+
+    They and the ways under them are found by iteration.
+    """
     (_, m_1, friction_1), (_, m_2, friction_2) = p.sides
     x_1, x_2 = x.position
     v_1, v_2 = x.velocity
@@ -99,10 +127,51 @@ def _substep(p: Params, q: Shape, x: State, forces: Pair, d: float) -> State:
         if contact_laws.settled(new_f_1, f_1) and contact_laws.settled(new_f_2, f_2):
             break
         f_1, f_2 = new_f_1, new_f_2
+    next_gaps = s_1 - next_right, s_2 + next_left
+    felt = _felt(p, q, x, forces, (f_1, f_2), next_gaps, d, begin)
     toppled = x.toppled or standing.topples(q, box)
     if toppled:
         box = Box(box.x, box.tilt, 0.0, 0.0)
-    return State((s_1, -s_2), (w_1, 0.0 - w_2), (f_1, 0.0 - f_2), box, toppled)
+    return State((s_1, -s_2), (w_1, 0.0 - w_2), (f_1, 0.0 - f_2), box, toppled, felt, x.clock)
+
+
+def _felt(
+    p: Params,
+    q: Shape,
+    x: State,
+    forces: Pair,
+    contact_forces: Pair,
+    next_gaps: Pair,
+    d: float,
+    begin: float,
+) -> TouchPair:
+    """What the fingers have felt d seconds after `begin` in s, with contact forces in N over them.
+
+    next_gaps in m are those at the end. A first contact is met at the speed relative to the face
+    that the box moves, pushed only by the other finger.
+    """
+    (_, m_1, friction_1), (_, m_2, friction_2) = p.sides
+    (x_1, x_2), (v_1, v_2), (u_1, u_2) = x.position, x.velocity, forces
+    (f_1, f_2), (touch_1, touch_2) = contact_forces, x.touch
+    right, left = standing.faces(q, x.box)
+    right_speed, left_speed = standing.face_speeds(q, x.box)
+    if touch.touches(x_1 - right, next_gaps[0], f_1):
+        if touch_1.first_time < 0.0:
+            free_s, _ = friction.move(x_1, v_1, m_1, u_1, friction_1, d)
+            box = x.box if x.toppled else standing.advance(q, x.box, Pushes(f_2, 0.0), d)
+            free_gap = free_s - standing.faces(q, box)[0]
+            moment, speed = touch.meeting(x_1 - right, v_1 - right_speed, free_gap, d)
+            touch_1 = touch.met(touch_1, begin + moment, speed)
+        touch_1 = touch.pressed(touch_1, begin, d, f_1)
+    if touch.touches(left - x_2, next_gaps[1], f_2):
+        if touch_2.first_time < 0.0:
+            free_s, _ = friction.move(-x_2, -v_2, m_2, 0.0 - u_2, friction_2, d)
+            box = x.box if x.toppled else standing.advance(q, x.box, Pushes(0.0, f_1), d)
+            free_gap = free_s + standing.faces(q, box)[1]
+            moment, speed = touch.meeting(left - x_2, left_speed - v_2, free_gap, d)
+            touch_2 = touch.met(touch_2, begin + moment, speed)
+        touch_2 = touch.pressed(touch_2, begin, d, f_2)
+    return touch_1, touch_2
 
 
 def _rate(p: Params, q: Shape, x: State, u: Inputs, h: float) -> float:

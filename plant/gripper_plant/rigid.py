@@ -9,9 +9,10 @@ from typing import Annotated, NamedTuple
 
 from block_variables import Parameter
 
-from . import contact, fingers
+from . import contact, fingers, touch
 from .fingers import Inputs as Inputs
 from .fingers import Pair as Pair
+from .touch import Clock, TouchPair
 
 LONGEST_STEP = fingers.LONGEST_STEP
 
@@ -55,11 +56,13 @@ class Params(fingers.Params):
 
 
 class State(NamedTuple):
-    """Fingertip positions in m, velocities in m/s and contact forces in N."""
+    """Fingertip positions in m, velocities in m/s, contact forces in N; touches, and the time."""
 
     position: Pair
     velocity: Pair
     contact_force: Pair
+    touch: TouchPair
+    clock: Clock
 
 
 class Outputs(NamedTuple):
@@ -71,11 +74,16 @@ class Outputs(NamedTuple):
     contact_force: fingers.ContactForce
     contact: fingers.Contact
     object_position: fingers.ObjectPosition
+    contact_impulse: touch.ContactImpulse
+    first_contact_time: touch.FirstContactTime
+    impact_velocity: touch.ImpactVelocity
+    touched: touch.Touched
+    impact_impulse: touch.ImpactImpulse
 
 
 def initial_state(p: Params, u: Inputs) -> State:
     """Both fingers at rest at their initial positions, free of the object."""
-    return State(p.initial_position, (0.0, 0.0), (0.0, 0.0))
+    return State(p.initial_position, (0.0, 0.0), (0.0, 0.0), fingers.initial_touch(p), touch.START)
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
@@ -84,9 +92,17 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     v_1, v_2 = x.velocity
     u_1, u_2 = fingers.forces(p.actuator, u)
     right, left = p.sides
-    s_1, v_1, f_1 = contact.advance(right, p.rates, x_1, v_1, u_1, h)
-    s_2, v_2, f_2 = contact.advance(left, p.rates, -x_2, -v_2, -u_2, h)
-    return State((s_1, -s_2), (v_1, 0.0 - v_2), (f_1, 0.0 - f_2))
+    touch_1, touch_2 = x.touch
+    now = x.clock.seconds
+    s_1, v_1, f_1, touch_1 = contact.advance(right, p.rates, x_1, v_1, u_1, h, touch_1, now)
+    s_2, v_2, f_2, touch_2 = contact.advance(left, p.rates, -x_2, -v_2, -u_2, h, touch_2, now)
+    return State(
+        (s_1, -s_2),
+        (v_1, 0.0 - v_2),
+        (f_1, 0.0 - f_2),
+        (touch_1, touch_2),
+        touch.later(x.clock, h),
+    )
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
@@ -94,6 +110,7 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     x_1, x_2 = x.position
     (right, _, _), (left, _, _) = p.sides
     gap_1, gap_2 = x_1 - right, -x_2 - left
+    right_touch, left_touch = x.touch
     return Outputs(
         x.position,
         x.velocity,
@@ -101,4 +118,9 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
         x.contact_force,
         (gap_1 <= 0.0, gap_2 <= 0.0),
         p.initial_object_position,
+        (right_touch.impulse, 0.0 - left_touch.impulse),
+        (right_touch.first_time, left_touch.first_time),
+        (right_touch.speed, left_touch.speed),
+        (right_touch.touched, left_touch.touched),
+        (right_touch.impact, 0.0 - left_touch.impact),
     )

@@ -11,18 +11,19 @@ Equations: plant/README.md
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, TypeAlias
 
 from block_variables import Input, Output, Parameter, check
 
 from . import box as standing
-from . import command_delay, contact_laws, drive, fingers, friction, wrist
+from . import command_delay, contact_laws, drive, fingers, friction, touch, wrist
 from .box import Box, Pushes, Shape
 from .command_delay import Line
 from .contact_laws import HuntCrossley, KelvinVoigt
 from .drive import Drive
 from .fingers import Pair as Pair
 from .friction import Motion
+from .touch import Clock, Touch, TouchPair
 from .wrist import Wrist
 
 LONGEST_STEP = fingers.LONGEST_STEP
@@ -104,7 +105,7 @@ class Inputs(NamedTuple):
 
 class Body(NamedTuple):
     """Wrist and half the opening in m and m/s, what the drive's servo follows in m/s, contact
-    forces in N; the box; toppled so far.
+    forces in N; the box; toppled so far; touches.
     """
 
     wrist: Motion
@@ -113,13 +114,32 @@ class Body(NamedTuple):
     contact_force: Pair
     box: Box
     toppled: bool
+    touch: TouchPair
 
 
 class State(NamedTuple):
-    """What moves, and the commands that are on their way to the wrist."""
+    """What moves, the commands that are on their way to the wrist, and the time."""
 
     body: Body
     line: Line
+    clock: Clock
+
+
+WristPosition: TypeAlias = Annotated[
+    float, Output("X, position of the wrist", unit="m", nominal=0.1, depends_on=set())
+]
+WristVelocity: TypeAlias = Annotated[
+    float, Output("X', velocity of the wrist", unit="m/s", nominal=0.1, depends_on=set())
+]
+WristForce: TypeAlias = Annotated[
+    float,
+    Output(
+        "f_c1 + f_c2, contact forces as a sensor at the wrist has them, without inertia",
+        unit="N",
+        nominal=1.0,
+        depends_on=set(),
+    ),
+]
 
 
 class Outputs(NamedTuple):
@@ -133,21 +153,14 @@ class Outputs(NamedTuple):
     object_position: fingers.ObjectPosition
     tilt: standing.Tilt
     toppled: standing.Toppled
-    wrist_position: Annotated[
-        float, Output("X, position of the wrist", unit="m", nominal=0.1, depends_on=set())
-    ]
-    wrist_velocity: Annotated[
-        float, Output("X', velocity of the wrist", unit="m/s", nominal=0.1, depends_on=set())
-    ]
-    wrist_force: Annotated[
-        float,
-        Output(
-            "f_c1 + f_c2, contact forces as a sensor at the wrist has them, without inertia",
-            unit="N",
-            nominal=1.0,
-            depends_on=set(),
-        ),
-    ]
+    wrist_position: WristPosition
+    wrist_velocity: WristVelocity
+    wrist_force: WristForce
+    contact_impulse: touch.ContactImpulse
+    first_contact_time: touch.FirstContactTime
+    impact_velocity: touch.ImpactVelocity
+    touched: touch.Touched
+    impact_impulse: touch.ImpactImpulse
 
 
 def initial_state(p: Params, u: Inputs) -> State:
@@ -156,22 +169,26 @@ def initial_state(p: Params, u: Inputs) -> State:
     middle = 0.5 * (x_1 + x_2)
     box = Box(p.initial_object_position, 0.0, 0.0, 0.0)
     line = command_delay.first(middle, p.wrist.delay)
-    body = Body((middle, 0.0), (0.5 * (x_1 - x_2), 0.0), 0.0, (0.0, 0.0), box, False)
-    return State(body, line)
+    right, left = standing.faces(p.shape, box)
+    felt = touch.initial(x_1 <= right), touch.initial(x_2 >= left)
+    body = Body((middle, 0.0), (0.5 * (x_1 - x_2), 0.0), 0.0, (0.0, 0.0), box, False, felt)
+    return State(body, line, touch.START)
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance gripper, wrist and object by h seconds (h > 0), force and command held."""
+    now, clock = x.clock.seconds, touch.later(x.clock, h)
+    body = _from_point(p, x.body)
     if p.wrist.delay == 0.0:
-        return x._replace(body=_advance(p, x.body, u.grip_force, u.wrist_command, h))
+        return State(_advance(p, body, u.grip_force, u.wrist_command, h, now), x.line, clock)
     line = command_delay.entered(x.line, u.wrist_command, p.wrist.delay, h)
-    body, elapsed = x.body, 0.0
+    elapsed = 0.0
     for command, end in zip(line.value, line.end, strict=True):
         until = h if end > h - SAME_MOMENT * h else end
         if until > elapsed + SAME_MOMENT * h:
-            body = _advance(p, body, u.grip_force, command, until - elapsed)
+            body = _advance(p, body, u.grip_force, command, until - elapsed, now + elapsed)
             elapsed = until
-    return State(body, command_delay.later(line, h))
+    return State(body, command_delay.later(line, h), clock)
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
@@ -181,6 +198,7 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     x_1, x_2 = middle + half, middle - half
     right, left = standing.faces(q, body.box)
     f_1, f_2 = body.contact_force
+    right_touch, left_touch = body.touch
     return Outputs(
         (x_1, x_2),
         (speed + closing, speed - closing),
@@ -193,11 +211,25 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
         middle,
         speed,
         f_1 + f_2,
+        (right_touch.impulse, 0.0 - left_touch.impulse),
+        (right_touch.first_time, left_touch.first_time),
+        (right_touch.speed, left_touch.speed),
+        (right_touch.touched, left_touch.touched),
+        (right_touch.impact, 0.0 - left_touch.impact),
     )
 
 
-def _advance(p: Params, x: Body, grip_force: float, command: float, h: float) -> Body:
-    """H seconds with the force of the drive in N and the command of the wrist in m held."""
+def _from_point(p: Params, x: Body) -> Body:
+    """At a communication point, from which on touches count again."""
+    right, left = standing.faces(p.shape, x.box)
+    middle, half = x.wrist[0], x.opening[0]
+    touch_1 = touch.from_point(x.touch[0], middle + half <= right)
+    touch_2 = touch.from_point(x.touch[1], middle - half >= left)
+    return x._replace(touch=(touch_1, touch_2))
+
+
+def _advance(p: Params, x: Body, grip_force: float, command: float, h: float, now: float) -> Body:
+    """H seconds from `now` in s on, the drive's force in N and the wrist's command in m held."""
     if x.wrist[0] != x.wrist[0]:  # it is not resolved
         return x
     n = fingers.substep_count(max(_contact_rate(p, x, grip_force, command, h), p.servo_rate), h)
@@ -205,15 +237,24 @@ def _advance(p: Params, x: Body, grip_force: float, command: float, h: float) ->
         return x._replace(wrist=WRIST_UNRESOLVED)
     d = h / n
     a = wrist.transition(p.wrist, d)
-    for _ in range(n):
-        x = _substep(p, a, x, grip_force, command, d)
+    for i in range(n):
+        x = _substep(p, a, x, grip_force, command, d, now + i * d)
     return x
 
 
 def _substep(
-    p: Params, a: wrist.Matrix, x: Body, grip_force: float, command: float, d: float
+    p: Params,
+    a: wrist.Matrix,
+    x: Body,
+    grip_force: float,
+    command: float,
+    d: float,
+    begin: float,
 ) -> Body:
-    """D seconds with all forces held; they and the ways under them are found by iteration."""
+    """D seconds from `begin` in s on with all forces held.
+
+    They and the ways under them are found by iteration.
+    """
     q, m, (middle, v), (half, speed) = p.shape, p.moving_mass, x.wrist, x.opening
     right, left = standing.faces(q, x.box)
     gap_1, gap_2 = half + middle - right, half - middle + left
@@ -223,6 +264,7 @@ def _substep(
     mean = x.reference + 0.5 * d * grip_force / m
     drive_force = drive.force(p.drive, m, grip_force, mean, speed)
     next_wrist, opening, box = x.wrist, x.opening, x.box
+    next_gap_1, next_gap_2 = gap_1, gap_2
     for _ in range(MAX_FORCE_ITERATIONS):
         next_wrist = wrist.follow(p.wrist, a, x.wrist, command, f_1 - f_2, d)  # (T2)
         # (T1); friction of the drive as in (F1)
@@ -241,11 +283,55 @@ def _substep(
         if contacts_settled and contact_laws.settled(abs(new_drive_force), abs(drive_force)):
             break
         f_1, f_2, drive_force = new_f_1, new_f_2, new_drive_force
+    touch_1, touch_2 = x.touch
+    if touch.touches(gap_1, next_gap_1, f_1):
+        if touch_1.first_time < 0.0:
+            touch_1 = _met(p, a, x, command, (drive_force, 0.0, f_2), 1.0, d, begin)
+        touch_1 = touch.pressed(touch_1, begin, d, f_1)
+    if touch.touches(gap_2, next_gap_2, f_2):
+        if touch_2.first_time < 0.0:
+            touch_2 = _met(p, a, x, command, (drive_force, f_1, 0.0), -1.0, d, begin)
+        touch_2 = touch.pressed(touch_2, begin, d, f_2)
     toppled = x.toppled or standing.topples(q, box)
     if toppled:
         box = Box(box.x, box.tilt, 0.0, 0.0)
     reference = drive.reference(p.drive, m, grip_force, x.reference, opening[1], d)
-    return Body(next_wrist, opening, reference, (f_1, 0.0 - f_2), box, toppled)
+    felt = touch_1, touch_2
+    return Body(next_wrist, opening, reference, (f_1, 0.0 - f_2), box, toppled, felt)
+
+
+def _met(
+    p: Params,
+    a: wrist.Matrix,
+    x: Body,
+    command: float,
+    forces: tuple[float, float, float],
+    side: float,
+    d: float,
+    begin: float,
+) -> Touch:
+    """The first contact of the finger on a side, 1 the right one and -1 the left one.
+
+    It is within the d seconds from `begin` in s on. forces in N are held: of the drive, and of the
+    contacts without this one. The speed is that relative to the face.
+    """
+    q, (middle, v), (half, speed) = p.shape, x.wrist, x.opening
+    drive_force, f_1, f_2 = forces
+    free_middle, _ = wrist.follow(p.wrist, a, x.wrist, command, f_1 - f_2, d)
+    free_half, _ = friction.move(
+        half, speed, p.moving_mass, drive_force + (f_1 + f_2), p.drive.law, d
+    )
+    fixed = p.object_fixed or x.toppled
+    box = x.box if fixed else standing.advance(q, x.box, Pushes(f_2, f_1), d)
+    (right, left), (free_right, free_left) = standing.faces(q, x.box), standing.faces(q, box)
+    right_speed, left_speed = standing.face_speeds(q, x.box)
+    face, face_speed, free_face = right, right_speed, free_right
+    if side < 0.0:
+        face, face_speed, free_face = left, left_speed, free_left
+    gap, rate = half + side * (middle - face), speed + side * (v - face_speed)
+    moment, closing = touch.meeting(gap, rate, free_half + side * (free_middle - free_face), d)
+    felt = x.touch[0] if side > 0.0 else x.touch[1]
+    return touch.met(felt, begin + moment, closing)
 
 
 def _contact_rate(p: Params, x: Body, grip_force: float, command: float, h: float) -> float:

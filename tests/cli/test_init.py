@@ -63,6 +63,12 @@ def filled_in(path):
     path.write_text("\n".join(lines), "utf-8")
 
 
+FELT = (
+    "contact_impulse", "first_contact_time", "impact_velocity", "touched", "impact_impulse",
+)  # fmt: skip
+"""What our plants tell of a contact that another one may not."""
+
+
 def test_a_foreign_plant(fmus_here, tmp_path):
     write_fmu(tmp_path / "vendor.fmu", FOREIGN, {})
     code, out, err = fmus_here("init", "a.toml", "--as", "plant=vendor.fmu", "--json")
@@ -79,7 +85,8 @@ def test_a_foreign_plant(fmus_here, tmp_path):
     notes = [re.split(" =| in the", line)[0] for line in lines if line.startswith("# TODO")]
     assert notes == [
         '# TODO "contact_force[1]"', '# TODO "contact_force[2]"', '# TODO "contact[1]"',
-        '# TODO "contact[2]"', "# TODO object_position", "# TODO object_width",
+        '# TODO "contact[2]"', "# TODO object_position",
+        *(f'# TODO "{name}[{j}]"' for name in FELT for j in (1, 2)), "# TODO object_width",
         "# TODO initial_object_position",
     ]  # fmt: skip
     assert any(line.endswith("not found in the FMU, left out; it has place") for line in lines)

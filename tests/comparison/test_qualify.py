@@ -129,7 +129,7 @@ def test_a_written_band_file_gives_the_same_verdict(short, heavy, heavier, tmp_p
     assert second.comparison.numerics == ()
 
 
-CONTACT = "s_1, v_1, f_1 = contact.advance("
+CONTACT = "s_1, v_1, f_1, touch_1 = contact.advance("
 
 
 def test_a_candidate_that_refuses_its_parameters(short, altered):
@@ -296,7 +296,7 @@ def test_a_qualification_is_true_where_the_candidate_may_take_the_place(copied, 
 def test_a_qualification_shows_its_verdict_and_its_reason(heavier):
     first, why, *lines = repr(heavier).splitlines()
     assert first.startswith("NOT QUALIFIED: GripperPlant.fmu as plant (now GripperPlant.fmu)")
-    assert why.startswith("  7 of 23 signals and ")
+    assert why.startswith("  7 of 33 signals and ")
     assert len(lines) < 22
     assert reason(heavier) in heavier._repr_html_()
 

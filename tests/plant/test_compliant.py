@@ -6,7 +6,7 @@ from itertools import islice
 import numpy as np
 import pytest
 from gripper_plant import compliant, contact_laws, friction
-from gripper_plant.compliant import Inputs, Params, State
+from gripper_plant.compliant import Inputs, Params
 from gripper_plant.contact_laws import HuntCrossley, KelvinVoigt, mean_force
 from hypothesis import given
 from hypothesis import strategies as st
@@ -23,10 +23,15 @@ HUNT = Params(hunt_crossley=HuntCrossley(True, 30000.0, 1.5, 2.0))
 LAWS = {"Kelvin-Voigt": VOIGT, "Hunt-Crossley": HUNT}
 
 
+def moving(p, position, velocity):
+    """Fingers there, at these speeds."""
+    return compliant.initial_state(p, Inputs())._replace(position=position, velocity=velocity)
+
+
 def arrival(p):
     """Finger 1 at the surface, on its way in."""
     right = p.sides[0].surface
-    return State((right, -0.11), (-V, 0.0), (0.0, 0.0), False)
+    return moving(p, (right, -0.11), (-V, 0.0))
 
 
 def run(p, x, force, h):
@@ -137,7 +142,7 @@ def test_fingers_with_friction_stick_in_the_object(name):
     x = after(p, compliant.initial_state(p, Inputs()), (-2.0, 2.0), 1e-3, 1500)
     assert x.velocity == (0.0, 0.0)
     assert np.abs(x.contact_force) == pytest.approx([2.0, 2.0], abs=0.3)
-    assert after(p, x, (-2.0, 2.0), 1e-3, 10) == x
+    assert after(p, x, (-2.0, 2.0), 1e-3, 10)[:4] == x[:4]
 
 
 FORCES = st.tuples(st.floats(-20.0, 20.0), st.floats(-20.0, 20.0))
@@ -158,7 +163,7 @@ def plants(draw):
     )
     speeds = st.floats(-0.5, 0.5)
     position = (0.035 + draw(near), -0.035 - draw(near))
-    return p, State(position, (draw(speeds), draw(speeds)), (0.0, 0.0), False)
+    return p, moving(p, position, (draw(speeds), draw(speeds)))
 
 
 @QUICK

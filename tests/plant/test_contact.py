@@ -1,15 +1,16 @@
 """A finger in free flight and against the object, with and without friction, against scipy."""
 
-from itertools import islice
+from itertools import count, islice
 from math import inf, isfinite
 
 import numpy as np
 import pytest
-from gripper_plant import contact, friction, rigid
-from gripper_plant.contact import Rates, time_to_contact
+from gripper_plant import contact, friction, rigid, touch
+from gripper_plant.contact import Rates
 from gripper_plant.fingers import MAX_SUBSTEPS, Side, substep_count
 from gripper_plant.friction import Law
 from gripper_plant.rigid import Inputs, Params
+from gripper_plant.touch import time_to_contact
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -25,9 +26,16 @@ INNER = STRIBECK._replace(inner=0.6, inner_begin=2e-3)
 
 def run(s, v, f, rates, h, law=friction.NONE, m=M):
     """Step after step of a finger whose object begins at zero, the force held."""
-    while True:
-        s, v, contact_force = contact.advance(Side(0.0, m, law), rates, s, v, f, h)
-        yield s, v, contact_force
+    for finger in touching_run(s, v, f, rates, h, law, m):
+        yield finger[:3]
+
+
+def touching_run(s, v, f, rates, h, law=friction.NONE, m=M):
+    """As run(), with what the finger has felt."""
+    side, felt = Side(0.0, m, law), touch.initial(s <= 0.0)
+    for k in count():
+        s, v, contact_force, felt = contact.advance(side, rates, s, v, f, h, felt, k * h)
+        yield s, v, contact_force, felt
 
 
 def contact_force(s, v, f, rates):

@@ -9,7 +9,7 @@ from gripper_plant import box as standing
 from gripper_plant import contact_laws, movable
 from gripper_plant.box import GRAVITY, Box
 from gripper_plant.contact_laws import HuntCrossley, KelvinVoigt
-from gripper_plant.movable import Inputs, Params, State
+from gripper_plant.movable import Inputs, Params
 from hypothesis import given
 from hypothesis import strategies as st
 from support.marks import examples
@@ -35,6 +35,12 @@ def after(p, x, force, h, n):
 
 def start(p):
     return movable.initial_state(p, Inputs())
+
+
+def moving(p, position, velocity):
+    """Fingers there, at these speeds."""
+    x = movable.initial_state(p, Inputs())
+    return x._replace(position=position, velocity=velocity)
 
 
 def stored(p, x):
@@ -80,7 +86,7 @@ def test_an_impact_hands_over_the_momentum(enabled):
         kelvin_voigt=KelvinVoigt(1e4, 0.0),
         hunt_crossley=HuntCrossley(enabled, 2e5, 1.5, 0.0),
     )
-    x = State((0.04, -0.036), (0.0, 0.1), (0.0, 0.0), Box(0.0, 0.0, 0.0, 0.0), False)
+    x = moving(p, (0.04, -0.036), (0.0, 0.1))
     x = after(p, x, (0.0, 0.0), 2e-4, 200)
     m, big = p.object_mass, 0.5
     assert x.contact_force == (0.0, 0.0)
@@ -91,7 +97,7 @@ def test_an_impact_hands_over_the_momentum(enabled):
 def test_the_order_of_convergence():
     """Second, over a push that comes, shifts the box and presses on."""
     p = replace(NEAR, kelvin_voigt=KelvinVoigt(200.0, 1.0))
-    x = State((0.04, -0.0361), (0.0, 0.1), (0.0, 0.0), Box(0.0, 0.0, 0.0, 0.0), False)
+    x = moving(p, (0.04, -0.0361), (0.0, 0.1))
     t, force = 0.05, (0.0, 0.5)
     steps = [100, 200, 400, 800]
     fine = after(p, x, force, t / 6400, 6400)
@@ -121,7 +127,7 @@ def plants(draw):
     near, speeds = st.floats(-1e-3, 2e-3), st.floats(-0.3, 0.3)
     box = Box(0.0, 0.0, draw(st.floats(-0.1, 0.1)), 0.0)
     position = (0.035 + draw(near), -0.035 - draw(near))
-    return p, State(position, (draw(speeds), draw(speeds)), (0.0, 0.0), box, False)
+    return p, moving(p, position, (draw(speeds), draw(speeds)))._replace(box=box)
 
 
 @QUICK

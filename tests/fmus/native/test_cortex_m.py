@@ -28,7 +28,7 @@ ADAPTIVE = {
     "GRASP_CONTROLLER": "GRASP_CONTROLLER_ADAPTIVE",
     "GRASPCONTROLLER": "GRASPCONTROLLERADAPTIVE",
     "published": "adaptive",
-    "13-22": "13-27",
+    "23-32": "23-37",
     "docs/cortex_m.c": "cortex_m.c",
 }
 M7 = {"cortex-m4": "cortex-m7", "fpv4-sp-d16": "fpv5-d16", "mps2-an386": "mps2-an500"}
@@ -115,7 +115,7 @@ def rows(tmp_path, monkeypatch):
     signals = closed_loop({}, 1e-3, 50)
     columns = [*signals.values()]
     return [
-        [*map(repr, map(float, row))] for row in zip(*columns[1:5], *columns[12:22], strict=True)
+        [*map(repr, map(float, row))] for row in zip(*columns[1:5], *columns[22:32], strict=True)
     ]
 
 
