@@ -44,6 +44,7 @@ class ImpactReduction(layer_2.Gains, name="impact_reduction"):
         ),
     ] = 0.6
     intensity_floor: layer_2.Floor = 1e-6
+    least_pull: layer_2.LeastPull = 0.0
 
 
 @dataclass(frozen=True)
@@ -171,8 +172,9 @@ def advance(p: Params, x: State, u: Inputs, f_s: PerFinger, h: float) -> State:
     virtual = new_target
     if gains_2.enabled:
         a = impedance.transition(gains_2.mass, gains_2.damping, gains_2.stiffness, h)
+        least, k = gains_2.least_pull, gains_2.stiffness
         pulls = tuple(
-            layer_2.with_least_pull(gains_2, f, 1.0, s_v - z)
+            layer_2.with_least_pull(least, k, f, 1.0, s_v - z)
             for (s_v, _), (z, _), f in zip(x.virtual, old_target, f_p, strict=True)
         )
         virtual = tuple(

@@ -258,7 +258,8 @@ def _closed(p: Params, virtual: Motion, pull: float, f_p: layer_2.Pair, h: float
     stiffness = pull * gains.stiffness
     a = impedance.transition(gains.mass, gains.damping, stiffness, h)
     half, rate = virtual
-    closing = layer_2.with_least_pull(gains, 0.5 * (f_1 - f_2), pull, half)
+    least, mean = gains.least_pull, 0.5 * (f_1 - f_2)
+    closing = layer_2.with_least_pull(least, gains.stiffness, mean, pull, half)
     return impedance.advance(a, half, rate, closing / stiffness)  # (6T)
 
 

@@ -117,13 +117,15 @@ def test_each_finger_of_a_hand_presses_with_its_share():
 @pytest.mark.parametrize("opening", [1.0, -1.0])
 def test_the_least_pull_ends_as_far_beyond_the_target(opening):
     """least_pull/K_a1, 10 mm, without a finger; and further out it is not felt."""
-    p = layer_2.Params(least_pull=0.25)
+    p = layer_2.Params()
     a = impedance.transition(p.mass, p.damping, p.stiffness, 1e-3)
     x_v = (0.05 * opening, 0.0)
     for _ in range(20000):
-        f = layer_2.with_least_pull(p, 0.0, opening, opening * x_v[0])
+        f = layer_2.with_least_pull(0.25, p.stiffness, 0.0, opening, opening * x_v[0])
         x_v = layer_2.follow(p, a, x_v, (0.0, 0.0), (0.0, 0.0), f)
     assert x_v[0] == pytest.approx(-0.01 * opening, rel=1e-6)
-    assert layer_2.with_least_pull(p, 0.3, opening, 0.0101) == 0.3
-    assert layer_2.with_least_pull(p, 0.3, opening, 0.004) == pytest.approx(0.3 - 0.15 * opening)
-    assert layer_2.with_least_pull(layer_2.Params(), -0.0, opening, -1.0).hex() == "-0x0.0p+0"
+    assert layer_2.with_least_pull(0.25, 25.0, 0.3, opening, 0.0101) == 0.3
+    assert layer_2.with_least_pull(0.25, 25.0, 0.3, opening, 0.004) == pytest.approx(
+        0.3 - 0.15 * opening
+    )
+    assert layer_2.with_least_pull(0.0, 25.0, -0.0, opening, -1.0).hex() == "-0x0.0p+0"
