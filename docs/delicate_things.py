@@ -19,7 +19,7 @@ HERE = Path(__file__).parent
 THINGS = ("tofu", "strawberry", "tomato", "egg", "marshmallow", "paper_cup")
 
 LAWS = ("position control", "published", "grip force")
-"""Position control that switches at contact, and the published law without and with a grip force."""
+"""Position control that switches at contact; the published law without and with a grip force."""
 
 GRAVITY = 9.80665
 LIFT = 2.0
