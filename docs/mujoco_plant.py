@@ -87,6 +87,11 @@ class Params(standing.Params):
                     f"friction.static[{j}] = {static!r} N: must be from 0 to "
                     f"friction.coulomb[{j}], {coulomb:g}: MuJoCo has no breakaway force above it"
                 )
+        if self.friction.inner != (0.0, 0.0):
+            raise ValueError(
+                f"friction.inner = {self.friction.inner!r} N: must be 0: MuJoCo has the same "
+                "friction all along the way"
+            )
 
 
 class State(NamedTuple):

@@ -39,7 +39,7 @@ FACTOR = 3.0
 """Each gain may be so many times as large or as small."""
 
 NOISY = {**SYSTEM.presets["bench"], **{f"plant.friction.coulomb[{j}]": 0.0 for j in (1, 2)}}
-NOISY |= {f"plant.friction.viscous[{j}]": 0.0 for j in (1, 2)}
+NOISY |= {f"plant.friction.{name}[{j}]": 0.0 for name in ("viscous", "inner") for j in (1, 2)}
 CONDITIONS: list[dict[str, Any]] = [{POSITION: 0.0}, {**NOISY, POSITION: 0.02}, {POSITION: 0.05}]
 """The grasps that count, each at its worst; the second with the bench's sensors, noise and all."""
 

@@ -190,7 +190,7 @@ def advance(q: Shape, box: Box, push: Pushes, d: float) -> Box:
         side = _pivot_side(q, box, push)
         if side == 0.0:
             grip = q.mu * q.m * GRAVITY
-            floor = (grip, grip, 0.0, 1.0)  # (F1)
+            floor = friction.coulomb(grip)  # (F1)
             x, v = friction.move(box.x, box.v, q.m, push.left - push.right, floor, remaining)
             return Box(x, 0.0, v, 0.0)
         if side > 0.0:

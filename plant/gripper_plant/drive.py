@@ -16,7 +16,7 @@ from typing import Annotated
 
 from block_variables import Group, Parameter, check
 
-from .friction import Law
+from .friction import Law, coulomb
 
 
 class Kind(IntEnum):
@@ -69,7 +69,7 @@ class Drive(Group, name="drive"):
     @cached_property
     def law(self) -> Law:
         """The friction as a law."""
-        return self.friction, self.friction, 0.0, 1.0
+        return coulomb(self.friction)
 
     @cached_property
     def omega(self) -> float:

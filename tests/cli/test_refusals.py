@@ -65,6 +65,8 @@ init a.toml --fingers 3 --as plant=vendor.fmu :: `grasp-cosim run a.toml --swap 
 init a.toml --fmu a=vendor.fmu --tandem :: each makes another system; must be one of them
 init a.toml --angles 0,x :: --angles '0,x': must be numbers in degrees, as 0,90,225
 identify a.csv :: a.csv: no such log; must be a .csv, .tsv, .mf4, .arrow, .feather, .parquet file
+identify --fit inner[3] :: 'inner[3]' cannot be fitted; did you mean
+identify --cross-validate --fit sensor :: a cross-validation leaves rows of contact times out
 identify --fit mass :: the published experiments: 'mass' cannot be fitted; valid: coulomb
 identify --set plant.nothing=1 :: --set plant.nothing:
 identify --out /proc/nowhere :: /proc/nowhere: cannot write

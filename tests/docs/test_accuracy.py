@@ -39,3 +39,38 @@ def test_the_deviations_from_the_published_simulations(capsys):
     for number in ("10.0 mm/s", "286 mm/s"):
         assert number in claims
         assert number in PAGE
+
+
+@pytest.mark.slow
+@needs_compiler
+def test_the_deviations_from_the_published_experiments(capsys):
+    """And the claim that does not hold."""
+    assert cli.main(["evaluate", "--bench", "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    rms = ", ".join(f"{name.replace('_', ' ')} {value:.3f}" for name, value in found["rms"].items())
+    assert f"root mean square of the differences in s: {rms}" in PAGE
+    assert [f"FAILS  {c['text']}" in PAGE for c in found["claims"] if not c["holds"]] == [True]
+    apart = {
+        row["condition"]: row for row in found["rows"] if (row["case"], row["finger"]) == (2, None)
+    }
+    first, second = (apart[colours]["simulated"] for colours in ("brown/white", "white/brown"))
+    assert f"they touch {first:.3f} s and {second:.3f} s apart" in PAGE
+    assert (
+        f"| contact times of mixed colours | 0.336 s | {found['rms']['mixed_colours']:.3f} s |"
+        in PAGE
+    )
+
+
+@pytest.mark.slow
+@needs_compiler
+@pytest.mark.parametrize(("inner", "column"), [((), 0), (("--fit", "inner[2]"), 1)])
+def test_the_cross_validation_of_the_friction(capsys, inner, column):
+    groups = ("--fit", "coulomb", "--fit", "viscous", *inner)
+    assert cli.main(["identify", *groups, "--cross-validate", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    for quantity, key in (
+        ("contact times of the fit", "rms"),
+        ("contact times of the row that was left out", "left_out_rms"),
+    ):
+        table = re.search(rf"^\| {quantity} \| ([\d.]+) s \| ([\d.]+) s \|$", PAGE, re.MULTILINE)
+        assert table[column + 1] == f"{found[key]:.3f}"

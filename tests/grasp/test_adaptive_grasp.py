@@ -94,7 +94,9 @@ FACES = {
     "sensor_2.reflectance": (0.3, 1.2),
     "plant.initial_object_position": (-0.05, 0.05),
 }
-SMOOTH = {f"plant.friction.{kind}[{j}]": 0.0 for kind in ("coulomb", "viscous") for j in (1, 2)}
+SMOOTH = {
+    f"plant.friction.{kind}[{j}]": 0.0 for kind in ("coulomb", "viscous", "inner") for j in (1, 2)
+}
 ROOM = {"sensor_1.ambient.enabled": True, "sensor_2.ambient.enabled": True}
 
 

@@ -8,6 +8,7 @@ import pytest
 from gripper_plant import contact, friction, rigid, touch
 from gripper_plant.contact import Rates
 from gripper_plant.fingers import MAX_SUBSTEPS, Side, substep_count
+from gripper_plant.friction import Law
 from gripper_plant.rigid import Inputs, Params
 from gripper_plant.touch import time_to_contact
 from hypothesis import given
@@ -18,7 +19,9 @@ from support.marks import examples
 M = 0.5  # kg
 RATES = (Rates(200.0, 200.0), Rates(400.0, 200.0), Rates(20.0, 200.0))
 """Critical, strong and weak damping."""
-VISCOUS = (0.0, 0.0, 5.0, 1.0)
+VISCOUS = Law(0.0, 0.0, 5.0, 1.0, 0.0, 0.0)
+STRIBECK = Law(0.4, 0.7, 2.0, 0.02, 0.0, 0.0)
+INNER = STRIBECK._replace(inner=0.6, inner_begin=2e-3)
 
 
 def run(s, v, f, rates, h, law=friction.NONE, m=M):
@@ -120,7 +123,7 @@ def test_a_long_step_is_made_of_sub_steps(case, rates, law):
 @given(
     st.floats(1e-3, 1e3), st.floats(-1e-3, 1e-3), st.floats(-1.0, 1.0), st.floats(-50.0, 50.0),
     st.floats(0.0, 2000.0), st.floats(0.0, 2000.0), st.floats(1e-5, 5e-3),
-    st.sampled_from([friction.NONE, VISCOUS, (0.4, 0.7, 2.0, 0.02)]),
+    st.sampled_from([friction.NONE, VISCOUS, STRIBECK, INNER]),
 )  # fmt: skip
 def test_the_object_never_pulls_and_gives_no_energy(m, s, v, a, alpha, beta, h, law):
     """Without an actuator: that of the motion, and of the depth as of a spring m beta^2."""
@@ -167,7 +170,7 @@ def test_a_pressed_finger_comes_to_rest_and_leaves_when_the_force_turns(rates, l
 
 def test_a_finger_that_sticks_inside_stays():
     """Between it and the object any contact force within F_S of the actuator's is at rest."""
-    law = (1.0, 1.0, 0.0, 1.0)
+    law = Law(1.0, 1.0, 0.0, 1.0, 0.0, 0.0)
     *_, (s, v, force) = islice(run(-1e-5, 0.0, -3.43, RATES[0], 1e-3, law), 50)
     assert (s, v) == (-1e-5, 0.0)
     assert abs(force - 3.43) <= 1.0
@@ -177,7 +180,7 @@ def test_a_finger_that_sticks_inside_stays():
 @pytest.mark.parametrize(("share", "finite"), [(0.999, True), (1.001, False)])
 def test_a_finger_with_too_many_sub_steps_has_no_result(viscous, share, finite):
     rates = Rates(0.5 * share * MAX_SUBSTEPS, 1.0)
-    after = next(run(0.0, 0.0, -1.0, rates, 0.1, (0.0, 0.0, viscous, 1.0)))
+    after = next(run(0.0, 0.0, -1.0, rates, 0.1, Law(0.0, 0.0, viscous, 1.0, 0.0, 0.0)))
     assert all(map(isfinite, after)) == finite
 
 

@@ -116,7 +116,7 @@ def test_impacts_over_all_rates_masses_speeds_and_steps(seed):
 
 
 @pytest.mark.parametrize(("alpha", "beta"), [(200.0, 200.0), (20.0, 2000.0), (1.0, 1e4)])
-@pytest.mark.parametrize("law", [friction.NONE, (0.2, 0.2, 0.0, 1.0)], ids=["free", "Coulomb"])
+@pytest.mark.parametrize("law", [friction.NONE, friction.coulomb(0.2)], ids=["free", "Coulomb"])
 def test_the_impulse_is_the_momentum_that_the_object_gives(alpha, beta, law):
     """Over a second of bounces, also where they let go within a sub-step, and in any steps."""
     for h in (1e-3, 5e-3):

@@ -6,12 +6,13 @@ from pathlib import Path
 import click
 
 from ..base.files import check_folder, write_text
-from ..grasp.identification.identification import DEFAULT_GROUPS, GROUPS
+from ..grasp.identification.identification import DEFAULT_GROUPS, GROUPS, SENSOR
 from ..grasp.identification.identification import identify as run_identification
 from ..grasp.published.evaluation import evaluate as run_evaluation
 from ..grasp.published.evaluation import verdict
 from ..grasp.system import grasp_system
 from ..recording.log_names import LogNames
+from ..report.plot import save_figure
 from ..system.overrides import Override
 from .frame import NEGATIVE, PATH, is_quiet, json_option, show
 from .options import controller_option, map_option, native_option, set_option
@@ -60,8 +61,14 @@ def evaluate(
     "--fit",
     multiple=True,
     default=DEFAULT_GROUPS,
-    metavar="|".join(GROUPS),
-    help="Group of values to fit. Repeat the option to fit several groups.",
+    metavar="|".join([*GROUPS, SENSOR]),
+    help="Group of values to fit, or that of one finger, such as inner[2]. Repeat the option to "
+    "fit several groups.",
+)
+@click.option(
+    "--cross-validate",
+    is_flag=True,
+    help="Repeat the fit to contact times without each row, and print by how much it misses it.",
 )
 @map_option
 @set_option
@@ -70,30 +77,40 @@ def evaluate(
 def identify(
     log: Path | None,
     fit: tuple[str, ...],
+    cross_validate: bool,
     names: LogNames,
     overrides: Sequence[Override],
     out: Path | None,
     as_json: bool,
 ) -> int:
-    """Fit friction, masses and drives of the fingers to measurements.
+    """Fit friction, masses and drives of the fingers, or a sensor, to measurements.
 
     LOG contains the signals of a run or of a test bench (.csv, .arrow, .parquet or .mf4). LOG may
     also be a table of contact times with the columns x_m, case, finger and time. The default is
-    the contact times of the published experiments. `run --values` uses the fitted values.
+    the contact times of the published experiments. With --fit sensor, LOG is the curve of a
+    sensor with the columns gap and voltage. `run --values` uses the fitted values.
 
     \b
     Example: grasp-cosim identify --fit coulomb --fit viscous --out fitted
     Fit to a run: grasp-cosim identify results/signals.csv --fit coulomb
     Fit to a log of a bench: grasp-cosim identify bench.csv --map names.toml
+    Calibrate a sensor: grasp-cosim identify curve.csv --fit sensor --out sensor
     Use the values: grasp-cosim run --preset bench --values fitted/values.toml
     """
     if out:
         check_folder(out)
     system = grasp_system().with_overrides(overrides)
     identification = run_identification(
-        log, fit=fit, system=system, progress=not is_quiet(), names=names
+        log,
+        fit=fit,
+        system=system,
+        progress=not is_quiet(),
+        names=names,
+        cross_validation=cross_validate,
     )
     if out:
+        for name, figure in identification.pictures().items():
+            save_figure(figure, out / name)
         for name, text in identification.files().items():
             write_text(out / name, text)
     show(as_json, identification.as_json(), identification.text())

@@ -182,9 +182,8 @@ FROM_FORCE_SINCE_CONTACT: Mapping[str, Any] = {
 def impact_impulse(signals: Signals, finger: int) -> float | None:
     """Impulse over IMPACT_WINDOW from first contact, of the plant or by trapezoids.
 
-    None if the run ends sooner. Of a plant that does not tell it, until the first sample the force
-    is taken as it is there, as one that begins with a jump has it. None with fewer than two
-    samples.
+    None if the run ends sooner. The trapezoids begin with the force of the first sample, as one
+    that begins with a jump has it. They need two samples.
     """
     times, force = since_contact(signals, finger)
     of_plant = f"plant.impact_impulse[{finger}]"
@@ -480,9 +479,9 @@ def first_contact(signals: Signals, finger: int) -> FirstContact | None:
     """First contact of a finger; None if it never touches. Most metrics ask for it.
 
     A plant that tells its time and speed has them, also of a contact between two samples. Of
-    others, between the last free communication point and the first one in contact, the gap runs out
-    at the rate of the last free point. Without a gap it is the first point in contact: late by a
-    step at most, but recorded, as are all later contacts.
+    others the gap runs out at the rate of the last free communication point, before the first one
+    in contact. Without a gap it is the first point in contact: late by a step at most, but
+    recorded, as are all later contacts.
     """
     key = first_contact, finger
     if key not in signals.worked_out:

@@ -81,6 +81,10 @@ class Log(ByName[npt.NDArray[np.float64] | npt.NDArray[np.bool_]]):
         values = np.asarray(column.numbers())
         return values if values.dtype == np.bool_ else values.astype(np.float64, copy=False)
 
+    def __contains__(self, name: object) -> bool:
+        """True for the name of a column, which is not read for that."""
+        return name in self._columns
+
     def check_unit(self, name: str, unit: str) -> None:
         """InputError where the column of that name, if there is one, is in no unit like this."""
         if name in self._columns:

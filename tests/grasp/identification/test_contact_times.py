@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterable, Sequence
 
+import numpy as np
 import pytest
 from grasp_cosim import InputError
 from grasp_cosim.grasp.identification.contact_times import (
@@ -14,6 +15,7 @@ from grasp_cosim.grasp.identification.contact_times import (
     contact_times,
     fit_contacts,
     identify_from_times,
+    leave_rows_out,
     published_contacts,
     read_contacts,
     scatter,
@@ -74,6 +76,45 @@ def test_the_friction_of_a_solution_in_continuous_time_comes_back(grasp):
         assert e.value == pytest.approx(TRUE[e.name], rel=0.02, abs=0.2)
         assert e.interval is not None
     assert found.rms < 2e-3  # s, which a contact time at STEP is off by
+
+
+@pytest.mark.slow
+def test_the_friction_of_the_inner_part_comes_back(grasp):
+    """Of the left finger, which gets beyond the middle in the second grasp only."""
+    grasps = ((X_M, 0), (0.06, 0))
+    simulated = simulator(grasp, 5e-3)
+    values = (("plant.friction.coulomb[2]", 0.5), ("plant.friction.inner[2]", 0.8))
+    measured = contacts(simulated([Grasp(x, 1.0, case, values) for x, case in grasps]), grasps)
+    parameters = parameters_of(["inner[2]", "coulomb[2]"], tuple(GROUPS), "test")
+    assert [p.name for p in parameters] == [name for name, _ in values]
+    found = fit_contacts(measured, parameters, simulated)
+    assert [e.value for e in found.estimates] == pytest.approx([0.5, 0.8], abs=2e-3)
+
+
+def test_rows_that_are_left_out_of_a_linear_model():
+    """The residuals are those of the whole fit over 1 - H, with the hat matrix H of a row."""
+    places = [(x, case) for x in (0.0, 0.01, 0.02, 0.03, 0.04) for case in (1, 2)]
+    noise = np.random.default_rng(1).normal(2.0, 0.1, (len(places), 2))
+    measured = contacts(noise.tolist(), places)
+    group = ["coulomb"]
+    design = np.array([[1.0, 50.0 * c.setting.x_m + 0.1 * c.finger * c.case] for c in measured])
+
+    def simulate(grasps):
+        both = []
+        for g in grasps:
+            a, b = (value for _, value in g.parameters)
+            both.append([a + b * (50.0 * g.x_m + 0.1 * finger * g.case) for finger in (1, 2)])
+        return both
+
+    parameters = parameters_of(group, tuple(GROUPS), "test")
+    wide = [p._replace(low=-100.0, high=100.0) for p in parameters]
+    whole = fit_contacts(measured, wide, simulate)
+    left_out = leave_rows_out(measured, wide, whole, simulate)
+    hat = design @ np.linalg.pinv(design)
+    for x in {c.setting.x_m for c in measured}:
+        row = [i for i, c in enumerate(measured) if c.setting.x_m == x]
+        expected = np.linalg.solve(np.eye(4) - hat[np.ix_(row, row)], whole.residuals[row])
+        assert left_out[row] == pytest.approx(expected, abs=1e-6)
 
 
 def test_equal_grasps_run_once():

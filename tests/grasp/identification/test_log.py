@@ -83,6 +83,20 @@ def test_without_noise_the_friction_of_our_simulation_comes_back(grasp, recorded
         assert e.value == pytest.approx(TRUE[e.name], rel=2e-3, abs=2e-3), e.name
 
 
+def test_the_friction_of_the_inner_part_comes_back(grasp):
+    """Of a left finger that gets beyond 20 mm before the middle; positions must be there."""
+    true = {"plant.friction.coulomb[2]": 0.6, "plant.friction.inner[2]": 0.7}
+    place = {"plant.friction.inner_begin[2]": -0.02, "plant.initial_object_position": 0.05}
+    system = grasp.with_values(place)
+    result = simulate(system.with_values(true), step=1e-3, stop=2.5)
+    log = Signals(result.time, dict(result.signals))
+    found = identified(system, log, "inner[2]", "coulomb[2]")
+    assert {e.name: e.value for e in found.estimates} == pytest.approx(true, rel=5e-3)
+    blind = {name: column for name, column in log.by_name.items() if ".position" not in name}
+    with pytest.raises(InputError, match=r"no signal 'plant\.position\[2\]'"):
+        identified(system, replace(log, by_name=blind), "inner[2]")
+
+
 def test_with_noise_the_intervals_hold_it(grasp, recorded):
     counts = [held(identified(grasp, noisy(recorded, seed)), TRUE) for seed in range(20)]
     assert sum(counts) / (20 * len(TRUE)) >= 0.88  # 95 % less 3 sigma of 80 intervals
@@ -261,6 +275,18 @@ def test_a_file_that_is_no_log_is_refused(tmp_path, name, content, message):
     with pytest.raises(InputError, match=message) as caught:
         load_log(tmp_path / name)
     assert "\n" not in str(caught.value)
+
+
+def test_a_file_without_contact_forces_is_that_of_free_fingers(grasp, recorded, tmp_path):
+    """Up to 1 s, when no finger of the recorded grasp touches."""
+    used = [f"{name}[{j}]" for name in ("plant.velocity", "controller.force") for j in (1, 2)]
+    free = recorded.time < 1.0
+    columns = [recorded.time[free], *(recorded[name][free] for name in used)]
+    rows = [",".join(repr(float(cell)) for cell in row) for row in zip(*columns, strict=True)]
+    (tmp_path / "log.csv").write_text("\n".join([",".join(["time", *used]), *rows, ""]))
+    found = identified(grasp, load_log(tmp_path / "log.csv", lambda _: None))
+    for e in found.estimates:
+        assert e.value == pytest.approx(TRUE[e.name], rel=5e-3, abs=5e-3), e.name
 
 
 def test_columns_that_nobody_uses_hold_whatever_they_like(grasp, recorded, tmp_path):

@@ -5,10 +5,10 @@ is within 2 ms of that at 0.1 ms. This is a hundredth of the scatter of the publ
 reflectances matter by their ratio only, so that surfaces of equal colours are one grasp.
 """
 
-import logging
 import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,15 +17,14 @@ import numpy as np
 from ...base.errors import InputError, SimulationError, choices
 from ...base.parallel import Crew
 from ...base.progress import Progress
-from ...interface.units import IDENTITY
 from ...system.description import System
-from ...tables.column import Column
-from ...tables.read_table import names_in, read_table
+from ...tables.read_table import names_in
 from ..metrics import FINGERS
 from ..presets import CASES, start_in_si, with_case, with_si_values
 from ..published.published_figures import Setting, published_figures
 from ..published.reproduction import run_grasp
 from .fit import Fit, Parameter, Vector, fit
+from .measured_table import read_rows
 
 STEP, STOP = 1e-3, 10.0
 """s; a finger that has not touched at STOP counts as touching then."""
@@ -39,9 +38,6 @@ OPTIONAL_COLUMNS = ("alpha_1", "alpha_2")
 
 UNITS = {"x_m": "m", "case": "1", "finger": "1", "time": "s", "alpha_1": "1", "alpha_2": "1"}
 """The units of these columns, where the table names none."""
-
-LOGGER = logging.getLogger(__name__)
-"""Gets as a warning which columns are not used."""
 
 Times = Sequence[float]
 
@@ -94,31 +90,8 @@ def read_contacts(path: Path) -> list[Contact]:
 
     A warning names other columns, which are not used. InputError names the line that is wrong.
     """
-    table = read_table(path)
-    names = [column.name for column in table.columns if column.name]
-    if missing := [name for name in COLUMNS if name not in names]:
-        raise InputError(
-            f"{path}: the columns are {choices(names)}, without {choices(missing)}; must be "
-            f"{choices(COLUMNS)}, and may be {choices(OPTIONAL_COLUMNS)}"
-        )
-    if not table.row_count:
-        raise InputError(f"{path}: has no line below its columns; must have contact times")
-    used = [name for name in UNITS if name in names]
-    if unused := [name for name in names if name not in used]:
-        LOGGER.warning("%s: not used: the columns %s", path, choices(unused, 6))
-    columns = [table.column(name) for name in used]
-    numbers = [_numbers_in_si(column) for column in columns]
-    return [
-        _contact(columns[0].row_place(row), dict(zip(used, values, strict=True)))
-        for row, values in enumerate(zip(*numbers, strict=True))
-    ]
-
-
-def _numbers_in_si(column: Column) -> list[float]:
-    """The numbers of a column in the unit that UNITS has for it."""
-    change = column.to_unit(UNITS[column.name])
-    numbers = [float(value) for value in column.numbers()]
-    return numbers if change == IDENTITY else [change(number) for number in numbers]
+    rows = read_rows(path, UNITS, "contact times", OPTIONAL_COLUMNS)
+    return [_contact(row.place, row.numbers) for row in rows]
 
 
 def identify_from_times(
@@ -126,10 +99,12 @@ def identify_from_times(
     contacts: Sequence[Contact],
     parameters: Sequence[Parameter],
     progress: bool,
+    cross_validation: bool = False,
 ) -> Fit:
     """Fit the parameters to contact times, grasps in parallel; the residuals are in s.
 
-    progress counts the grasps on standard error.
+    With cross_validation the fit is repeated without each row. progress counts the grasps on
+    standard error.
     """
     system = system.with_experiment(STEP, STOP)
     workers = os.cpu_count() or 1
@@ -138,27 +113,72 @@ def identify_from_times(
         def simulate(grasps: Sequence[Grasp]) -> Iterable[Times]:
             return crew.map(contact_times, [(system, grasp) for grasp in grasps], bar)
 
-        return fit_contacts(contacts, parameters, simulate)
+        simulate_once = _remembering(simulate)
+        found = fit_contacts(contacts, parameters, simulate_once)
+        if not cross_validation:
+            return found
+        return replace(found, left_out=leave_rows_out(contacts, parameters, found, simulate_once))
+
+
+def _remembering(simulate: Simulator) -> Simulator:
+    """A simulator that runs equal grasps once."""
+    simulated: dict[Grasp, Times] = {}
+
+    def simulate_once(grasps: Sequence[Grasp]) -> list[Times]:
+        new = list(dict.fromkeys(grasp for grasp in grasps if grasp not in simulated))
+        simulated.update(zip(new, simulate(new), strict=True))
+        return [simulated[grasp] for grasp in grasps]
+
+    return simulate_once
 
 
 def fit_contacts(
-    contacts: Sequence[Contact], parameters: Sequence[Parameter], simulate: Simulator
+    contacts: Sequence[Contact],
+    parameters: Sequence[Parameter],
+    simulate: Simulator,
+    place: str = "identify",
 ) -> Fit:
     """Fit the parameters to contact times with what simulates grasps; equal grasps run once."""
-    measured = np.array([c.time for c in contacts])
-    simulated: dict[Grasp, Times] = {}
+    simulate_once = _remembering(simulate)
 
     def residuals(points: Sequence[Vector]) -> list[Vector]:
-        grasps_at = [[_grasp(c, parameters, x) for c in contacts] for x in points]
-        grasps = [grasp for grasps_of_point in grasps_at for grasp in grasps_of_point]
-        new = list(dict.fromkeys(grasp for grasp in grasps if grasp not in simulated))
-        simulated.update(zip(new, simulate(new), strict=True))
-        return [
-            _times_of(contacts, [simulated[grasp] for grasp in grasps_of_point]) - measured
-            for grasps_of_point in grasps_at
-        ]
+        return _residuals(contacts, parameters, points, simulate_once)
 
-    return fit(residuals, parameters, "identify")
+    return fit(residuals, parameters, place)
+
+
+def leave_rows_out(
+    contacts: Sequence[Contact], parameters: Sequence[Parameter], found: Fit, simulate: Simulator
+) -> Vector:
+    """The residual of each contact, in s, in a fit to the contacts of all other settings.
+
+    Each fit begins at the parameters that were found with all contacts.
+    """
+    begin = [p._replace(start=e.value) for p, e in zip(parameters, found.estimates, strict=True)]
+    left_out = np.empty(len(contacts))
+    for setting in dict.fromkeys(c.setting for c in contacts):
+        others = [c for c in contacts if c.setting != setting]
+        without = fit_contacts(others, begin, simulate, f"identify without {setting.label}")
+        values = np.array([e.value for e in without.estimates])
+        rows = [row for row, c in enumerate(contacts) if c.setting == setting]
+        of_setting = [contacts[row] for row in rows]
+        left_out[rows] = _residuals(of_setting, parameters, [values], simulate)[0]
+    return left_out
+
+
+def _residuals(
+    contacts: Sequence[Contact],
+    parameters: Sequence[Parameter],
+    points: Sequence[Vector],
+    simulate: Simulator,
+) -> list[Vector]:
+    """Simulated less measured times in s at several values of the parameters."""
+    measured = np.array([c.time for c in contacts])
+    grasps = [_grasp(c, parameters, x) for x in points for c in contacts]
+    times = list(simulate(grasps))
+    count = len(contacts)
+    of_points = [times[first : first + count] for first in range(0, len(times), count)]
+    return [_times_of(contacts, of_point) - measured for of_point in of_points]
 
 
 def _times_of(contacts: Sequence[Contact], times: Sequence[Times]) -> Vector:

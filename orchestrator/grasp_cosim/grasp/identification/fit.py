@@ -64,11 +64,18 @@ class Fit:
     estimates: tuple[Estimate, ...]
     residuals: Vector
     points: int
+    left_out: Vector | None = None
+    """Of a cross-validation: the residual of each figure in a fit without its row."""
 
     @property
     def rms(self) -> float:
         """Root mean square of the residuals, in their unit."""
-        return float(np.sqrt(np.mean(self.residuals**2)))
+        return root_mean_square(self.residuals)
+
+
+def root_mean_square(residuals: Vector) -> float:
+    """Of residuals, in their unit."""
+    return float(np.sqrt(np.mean(residuals**2)))
 
 
 def fit(residuals: Residuals, parameters: Sequence[Parameter], place: str) -> Fit:

@@ -4,7 +4,7 @@ Free of the object a finger obeys m·x'' = g·u(t - d) - sgn(x')·F(|x'|), so th
 length T
 
     r = (m·Δx' - g·∫u(t - d) dt) / T + sgn(x')·mean F(|x'|)
-    F(v) = F_C + (F_S - F_C)·exp(-(v/v_s)^2) + B·v
+    F(v) = F_C + (F_S - F_C)·exp(-(v/v_s)^2) + B·v, and F_I on the inner part of the way
 
 is zero but for noise, in N. No signal is differentiated: noise of the velocity enters by its two
 ends over T. If a log has no velocity, it is the slope of a parabola through SLOPE_WINDOW samples of
@@ -24,7 +24,7 @@ from ...base.errors import InputError, nearest
 from ...base.text import counted
 from ...metrics.metric import Signals
 from ...system.description import System
-from ..metrics import FINGERS
+from ..metrics import CLOSING, FINGERS
 from ..presets import start_in_si
 from .fit import Fit, Parameter, Vector, fit
 
@@ -72,6 +72,8 @@ class Windows(NamedTuple):
     """The sign of the velocity: 1 or -1."""
     speeds: Vector
     """m/s, a row of samples for each window."""
+    positions: Vector | None
+    """m, a row of samples for each window; None where nothing depends on them."""
     log_times: Vector
     """s, of all samples of the log."""
     impulses: Vector
@@ -95,8 +97,9 @@ def identify_from_log(
     """
     # What was commanded before the log began is not known: such windows do not count.
     max_delay = max((p.high for p in parameters if p.name == DELAY), default=0.0)
-    windows = [_windows(log, j, max_delay, place) for j in FINGERS]
     names = [p.name for p in parameters]
+    has_inner = {j: _has_inner(system, names, j) for j in FINGERS}
+    windows = [_windows(log, j, max_delay, place, has_inner[j]) for j in FINGERS]
 
     def residuals(x: Vector) -> Vector:
         values = dict(zip(names, x.tolist(), strict=True))
@@ -105,7 +108,13 @@ def identify_from_log(
     return windows, fit(lambda points: [residuals(x) for x in points], parameters, place)
 
 
-def _windows(log: Signals, finger: int, max_delay: float, place: str) -> Windows:
+def _has_inner(system: System, fitted: Sequence[str], finger: int) -> bool:
+    """True if a finger has additional friction on the inner part of its way, or may have."""
+    name = f"{FRICTION}inner[{finger}]"
+    return name in fitted or start_in_si(system, name) != 0.0
+
+
+def _windows(log: Signals, finger: int, max_delay: float, place: str, has_inner: bool) -> Windows:
     """The windows of a finger in which it moves freely; InputError where there are none."""
     step = _step(log.time, place)
     samples = int(WINDOW / step + 1e-6) + 1
@@ -133,6 +142,9 @@ def _windows(log: Signals, finger: int, max_delay: float, place: str) -> Windows
         )
     impulse_of_step = command[:-1] * np.diff(log.time)  # a command holds until the next sample
     velocities, times = velocities[counts], times[counts]
+    positions = None
+    if has_inner:
+        positions = by_window(_signal(log, f"{POSITION}[{finger}]", place))[counts]
     return Windows(
         finger,
         begin=times[:, 0],
@@ -140,6 +152,7 @@ def _windows(log: Signals, finger: int, max_delay: float, place: str) -> Windows
         velocity_change=velocities[:, -1] - velocities[:, 0],
         direction=direction[counts],
         speeds=np.abs(velocities),
+        positions=positions,
         log_times=np.asarray(log.time),
         impulses=np.append(0.0, np.cumsum(impulse_of_step)),
     )
@@ -172,6 +185,10 @@ def _residuals(system: System, values: Mapping[str, float], windows: Windows) ->
     stribeck = np.exp(-((windows.speeds / stribeck_velocity) ** 2))
     friction = coulomb + (static - coulomb) * stribeck
     friction += value_of(f"{FRICTION}viscous{element}") * windows.speeds
+    if windows.positions is not None:
+        begin = value_of(f"{FRICTION}inner_begin{element}")
+        is_inner = CLOSING[windows.finger] * (windows.positions - begin) > 0.0
+        friction += value_of(f"{FRICTION}inner{element}") * is_inner
     gain, delay = values.get(f"{GAIN}{element}", 1.0), values.get(DELAY, 0.0)
     drive = gain * windows.mean_force(delay)
     duration = windows.end - windows.begin

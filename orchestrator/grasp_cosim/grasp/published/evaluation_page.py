@@ -17,11 +17,14 @@ from ...system.times import in_seconds
 from ..pictures import draw_contact_forces, draw_contact_times, draw_targets
 from ..presets import CASES
 from ..system import controller_name
-from .published_figures import REFLECTANCE_X_M, Source
+from .published_figures import RED, REFLECTANCE_X_M, WHITE, Source
 from .reproduction import AT_SENSOR_CONTACT, REPRODUCTIONS, Evidence
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from ...recording.result import Result
 
 PAGE = Template("""<!DOCTYPE html>
 <html lang="en">
@@ -218,25 +221,58 @@ def _number(value: float, decimals: int, sign: str = "") -> str:
 
 def figures(evidence: Evidence, source: Source) -> dict[str, tuple[str, Figure]]:
     """The pictures by name, each with its title; InputError without matplotlib."""
-    runs = {run.case: run.result for run in evidence.runs.values() if run.result}
-    times = _contact_times_figure(evidence)
-    forces, targets = new_figure(7.2, 7.0), new_figure(7.2, 4.0)
-    force_rows, target_axes = forces.subplots(len(CASES), 1, sharex=True), targets.subplots()
-    for axes, case in zip(force_rows, CASES, strict=True):
-        draw_contact_forces(axes, runs[case])
-        axes.set_title(f"Case {case}", fontsize=10)
-    draw_targets(target_axes, [(runs[1], "--", "Case 1"), (runs[2], "-", "Case 2")])
-    for axes in (force_rows[-1], target_axes):
-        axes.set_xlabel("time in s")
-        axes.set_xlim(0.0, REPRODUCTIONS[source].picture_end)
-    for figure in (times, forces, targets):
-        legend_below(figure)
+    runs = {key: run.result for key, run in evidence.runs.items() if run.result}
+    case_0, case_1, case_2 = (runs[WHITE, case] for case in CASES)
+    end = REPRODUCTIONS[source].picture_end
     place = f"object at {1e3 * REFLECTANCE_X_M:.0f} mm"
-    return {
-        "contact_times": ("contact times, simulated and published", times),
-        "contact_forces": (f"contact forces, {place}", forces),
-        "target_position": (f"target position, {place}", targets),
+    both = [(case_1, "--", "Case 1"), (case_2, "-", "Case 2")]
+    pictures = {
+        "contact_times": (
+            "contact times, simulated and published",
+            _contact_times_figure(evidence),
+        ),
+        "contact_forces": (
+            f"contact forces, {place}",
+            _contact_forces_figure([case_0, case_1, case_2], end),
+        ),
+        "target_position": (f"target position, {place}", _targets_figure(both, end)),
+        "target_position_case_0": (
+            f"target position in Case 0, {place}",
+            _targets_figure([(case_0, "-", "Case 0")], end),
+        ),
     }
+    if (RED, 2) in runs:
+        colours = [(runs[RED, 2], "--", "red"), (case_2, "-", "white")]
+        title = f"target position in Case 2 of red and of white faces, {place}"
+        pictures["target_position_colours"] = (title, _targets_figure(colours, end))
+    for _, figure in pictures.values():
+        legend_below(figure)
+    return pictures
+
+
+def _contact_forces_figure(runs: Sequence[Result], end: float) -> Figure:
+    """The contact forces, a row for each case, until a time in s."""
+    figure = new_figure(7.2, 7.0)
+    rows = figure.subplots(len(CASES), 1, sharex=True)
+    for axes, case, run in zip(rows, CASES, runs, strict=True):
+        draw_contact_forces(axes, run)
+        axes.set_title(f"Case {case}", fontsize=10)
+    _end_at(rows[-1], end)
+    return figure
+
+
+def _targets_figure(runs: Sequence[tuple[Result, str, str]], end: float) -> Figure:
+    """The target positions of grasps, until a time in s."""
+    figure = new_figure(7.2, 4.0)
+    axes = figure.subplots()
+    draw_targets(axes, runs)
+    _end_at(axes, end)
+    return figure
+
+
+def _end_at(axes: Axes, end: float) -> None:
+    axes.set_xlabel("time in s")
+    axes.set_xlim(0.0, end)
 
 
 def _contact_times_figure(evidence: Evidence) -> Figure:

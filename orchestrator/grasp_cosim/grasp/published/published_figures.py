@@ -41,6 +41,11 @@ class Setting(NamedTuple):
         return f"{x_m:.2f} m{colours}"
 
 
+WHITE = Setting(REFLECTANCE_X_M)
+RED = Setting(REFLECTANCE_X_M, 0.92, 0.92)
+"""The settings of the pictures: both faces white, or red."""
+
+
 class PublishedFigure(NamedTuple):
     """A published figure in s: the contact time of a finger, or, finger None, the difference.
 

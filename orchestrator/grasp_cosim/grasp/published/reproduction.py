@@ -25,7 +25,7 @@ from ...system.description import System
 from ...system.times import in_seconds
 from ..metrics import FINGERS, IMPACT_WINDOW
 from ..presets import CASES, start_in_si, with_case, with_si_values
-from .published_figures import REFLECTANCE_X_M, PublishedFigure, Setting, Source, published_figures
+from .published_figures import RED, WHITE, PublishedFigure, Setting, Source, published_figures
 
 TOUCH_CHECK_INTERVAL = 0.05
 """s; how often a run checks whether both fingers touch."""
@@ -110,7 +110,7 @@ def grasp_run(result: Result, setting: Setting, case: int) -> GraspRun:
         times_at_sensor_contact=(first, second),
         overshoot=float(np.max((target - setting.x_m) * side)),
         touch_forces=(right, left),
-        result=result if setting == Setting(REFLECTANCE_X_M) else None,
+        result=result if setting == WHITE or (setting == RED and case == 2) else None,
     )
 
 
