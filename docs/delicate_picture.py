@@ -18,7 +18,7 @@ SLIPS, HOLDS, BREAKS = "#cfe0f3", "#9bd18b", "#f4b8ad"
 MARKERS: Mapping[str, tuple[str, str, str]] = {
     "position control": ("X", "#b3261e", "position control"),
     "published": ("o", "#1f4e8c", "the published law"),
-    "set force": ("*", "#111111", "the published law with a set force"),
+    "grip force": ("*", "#111111", "the law with a grip force"),
 }
 """Marker, colour and words of a law."""
 
@@ -41,7 +41,7 @@ def draw(folder: Path) -> None:
     add_heading(
         figure,
         Caption("Between slipping and breaking", "highest force of a finger in a grasp and a lift"),
-        "Position control closes at 50 mm/s, and has the grip force of the law with a set force",
+        "Position control closes at 50 mm/s, and has the same grip force",
     )
     save_figure(figure, folder / "delicate.png")
 

@@ -3,8 +3,7 @@
     .venv/bin/python docs/delicate_things.py     # in the folder of the checkout; half a minute
 
 Below a force a thing slips, and above another one it is damaged. The grip force is the middle of
-both by its logarithm. Position control has the same one. The published law with a set force has
-K_i = 2·F/W.
+both by its logarithm. Position control has the same one.
 """
 
 from collections.abc import Iterator
@@ -19,7 +18,8 @@ HERE = Path(__file__).parent
 
 THINGS = ("tofu", "strawberry", "tomato", "egg", "marshmallow", "paper_cup")
 
-LAWS = ("position control", "published", "set force")
+LAWS = ("position control", "published", "grip force")
+"""Position control that switches at contact; the published law without and with a grip force."""
 
 GRAVITY = 9.80665
 LIFT = 2.0
@@ -74,14 +74,8 @@ def systems(system: System, thing: str, position_control: Path) -> dict[str, Sys
             {"controller.grip_force": force}
         ),
         "published": chosen,
-        "set force": with_set_force(chosen, thing, force),
+        "grip force": chosen.with_values({"controller.contact_force.grip_force": force}),
     }
-
-
-def with_set_force(system: System, thing: str, force: float) -> System:
-    """The system whose fingers press with a force in N on a thing, less what that gives."""
-    width: Any = system.presets[thing]["plant.object_width"]
-    return system.with_values({"controller.contact_force.stiffness": 2.0 * force / width})
 
 
 def outcome(run: Result) -> Outcome:

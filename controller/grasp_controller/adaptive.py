@@ -66,8 +66,7 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance the virtual objects by h seconds (h > 0), the samples u held, and learn from them."""
     v_1, v_2 = u.velocity
     closing = holding.filtered(p.hold, x.closing, v_1 - v_2, h)
-    u_1, u_2 = series.outputs(p, x.layers, u).force
-    pressed = holding.pressed(p.hold, 0.5 * u_2 - 0.5 * u_1, closing)
+    pressed = holding.pressed(p.hold, series.published_squeeze(p, x.layers, u), closing)
     lasting = holding.lasting(p.hold, x.lasting, pressed, h)
     touching_1 = holding.touching(p.hold, p.reflectance, x.line_1, lasting)
     touching_2 = holding.touching(p.hold, p.reflectance, x.line_2, lasting)

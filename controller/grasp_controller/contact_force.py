@@ -13,7 +13,7 @@ class Params(Group, name="contact_force"):
     """The paper's gains.
 
     D_i = 2·sqrt(K_i·m_j) is critical damping of a finger of 0.5 kg; K_i·W/2 is the grasp, 3.43 N on
-    an object of 70 mm.
+    an object of 70 mm. A grip force takes its place.
     """
 
     damping: Annotated[
@@ -24,6 +24,16 @@ class Params(Group, name="contact_force"):
         float,
         Parameter("K_i, stiffness of the impedance", unit="N/m", low=0.0, high=1e6, tunable=True),
     ] = 98.0
+    grip_force: Annotated[
+        float,
+        Parameter(
+            "F, mean force with which fingers press; 0 for that of the published law, K_i·W/2",
+            unit="N",
+            low=0.0,
+            high=1e4,
+            tunable=True,
+        ),
+    ] = 0.0
 
 
 def force(p: Params, x: float, x_dot: float, x_v1: Motion) -> float:

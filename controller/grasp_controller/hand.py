@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from block_variables import Input, Output, Parameter, check
 
 from . import contact_force as layer_1
+from . import grip, impedance
 from . import impact_reduction as layer_2
-from . import impedance
 from . import simultaneous_contact as layer_3
 from .hand_size import FINGERS
 from .impedance import Motion
@@ -44,6 +44,7 @@ class ImpactReduction(layer_2.Gains, name="impact_reduction"):
         ),
     ] = 0.6
     intensity_floor: layer_2.Floor = 1e-6
+    least_pull: layer_2.LeastPull = 0.0
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,8 @@ class State(NamedTuple):
     intensity: PerFinger
     simultaneous_contact_force: PerFinger
     impact_reduction_force: PerFinger
+    grip: grip.State
+    light_rate: PerFinger
 
 
 Force = Annotated[
@@ -139,7 +142,8 @@ class Outputs(NamedTuple):
 def initial_state(p: Params, u: Inputs) -> State:
     """Virtual objects at the measured fingers and at rest, so that nothing jumps at the start."""
     at_rest = tuple((s, 0.0) for s in u.position)
-    return State(_desired(p, u), at_rest, u.intensity, virtual_forces(p, u.intensity), ZEROS)
+    f_s = virtual_forces(p, u.intensity)
+    return State(_desired(p, u), at_rest, u.intensity, f_s, ZEROS, grip.AT_REST, ZEROS)
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
@@ -168,22 +172,28 @@ def advance(p: Params, x: State, u: Inputs, f_s: PerFinger, h: float) -> State:
     virtual = new_target
     if gains_2.enabled:
         a = impedance.transition(gains_2.mass, gains_2.damping, gains_2.stiffness, h)
+        least, k = gains_2.least_pull, gains_2.stiffness
+        pulls = tuple(
+            layer_2.with_least_pull(least, k, f, 1.0, s_v - z)
+            for (s_v, _), (z, _), f in zip(x.virtual, old_target, f_p, strict=True)
+        )
         virtual = tuple(
             layer_2.follow(gains_2, a, s_v, z, z_after, f)
-            for s_v, z, z_after, f in zip(x.virtual, old_target, new_target, f_p, strict=True)
+            for s_v, z, z_after, f in zip(x.virtual, old_target, new_target, pulls, strict=True)
         )
-    return State(new_target, virtual, u.intensity, f_s, f_p)
+    gripping, light_rate = _gripped(p, x, u, h)
+    return State(new_target, virtual, u.intensity, f_s, f_p, gripping, light_rate)
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """The forces for the samples u; a layer that is off passes on the layer above."""
     target = x.target if p.simultaneous_contact.enabled else _desired(p, u)
-    virtual = x.virtual if p.impact_reduction.enabled else target
-    # Eq. (7N)
-    forces = tuple(
-        n * layer_1.force(p.contact_force, s, s_dot, s_v)
-        for n, s, s_dot, s_v in zip(p.weight, u.position, u.velocity, virtual, strict=True)
-    )
+    virtual = _virtual(p, x, u)
+    forces = layer_forces(p, virtual, u)
+    force = p.contact_force.grip_force
+    if force > 0.0:
+        more = grip.change(force, _squeeze(forces), _brake(p, u), x.grip.share)
+        forces = tuple(f - n * more for n, f in zip(p.weight, forces, strict=True))
     return Outputs(
         forces,
         tuple(z for z, _ in target),
@@ -191,6 +201,57 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
         x.simultaneous_contact_force,
         x.impact_reduction_force,
     )
+
+
+def published_forces(p: Params, x: State, u: Inputs) -> PerFinger:
+    """u_k in N by Eq. (7N), whatever the grip force is."""
+    return layer_forces(p, _virtual(p, x, u), u)
+
+
+def layer_forces(p: Params, virtual: Motions, u: Inputs) -> PerFinger:
+    """u_k in N by Eq. (7N)."""
+    # Eq. (7N)
+    return tuple(
+        n * layer_1.force(p.contact_force, s, s_dot, s_v)
+        for n, s, s_dot, s_v in zip(p.weight, u.position, u.velocity, virtual, strict=True)
+    )
+
+
+def _virtual(p: Params, x: State, u: Inputs) -> Motions:
+    """The virtual objects of layer 1."""
+    target = x.target if p.simultaneous_contact.enabled else _desired(p, u)
+    return x.virtual if p.impact_reduction.enabled else target
+
+
+def _squeeze(forces: PerFinger) -> float:
+    """The mean squeeze in N by the forces u_k in N."""
+    total = 0.0
+    for force in forces:
+        total = total - force
+    return total / float(FINGERS)
+
+
+def _brake(p: Params, u: Inputs) -> float:
+    """D_i·v in N, v being the mean speed at which the fingers close."""
+    return -p.contact_force.damping * weighted_mean(p.weight, u.velocity)
+
+
+def _gripped(p: Params, x: State, u: Inputs, h: float) -> tuple[grip.State, PerFinger]:
+    """How far the grip force has come h seconds later, and the rates of the light in 1/s."""
+    force, floor = p.contact_force.grip_force, p.impact_reduction.intensity_floor
+    if force <= 0.0:
+        return grip.AT_REST, ZEROS
+    rates = tuple(
+        grip.light_rate(floor, rate, xi, before, h)
+        for rate, xi, before in zip(x.light_rate, u.intensity, x.intensity, strict=True)
+    )
+    all_quiet = 1.0
+    for rate in rates:
+        all_quiet = all_quiet * grip.quiet(rate)
+    squeeze, brake = _squeeze(published_forces(p, x, u)), _brake(p, u)
+    pressed = squeeze + brake + grip.change(force, squeeze, brake, x.grip.share)
+    closing = 2.0 * weighted_mean(p.weight, u.velocity)
+    return grip.advance(x.grip, pressed, closing, all_quiet, h), rates
 
 
 def virtual_forces(p: Params, intensity: PerFinger) -> PerFinger:

@@ -111,8 +111,8 @@ def initial_state(p: Params, u: Inputs) -> State:
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance the virtual objects by h seconds (h > 0), the samples u held, and learn from them."""
     rate, squeeze = 0.0, 0.0
-    y = hand.outputs(p, x.layers, u)
-    for s_dot, force in zip(u.velocity, y.force, strict=True):
+    forces = hand.published_forces(p, x.layers, u)
+    for s_dot, force in zip(u.velocity, forces, strict=True):
         rate = rate + s_dot
         squeeze = squeeze - force
     fingers = float(FINGERS)

@@ -26,6 +26,17 @@ Floor = Annotated[
     ),
 ]
 
+LeastPull = Annotated[
+    float,
+    Parameter(
+        "least force that pulls the virtual object to close; 0 for the published law",
+        unit="N",
+        low=0.0,
+        high=1e3,
+        tunable=True,
+    ),
+]
+
 
 @dataclass(frozen=True, slots=True)
 class Gains(Group, name="impact_reduction"):
@@ -61,6 +72,7 @@ class Params(Gains, name="impact_reduction"):
         ),
     ] = (0.6, -0.6)
     intensity_floor: Floor = 1e-6
+    least_pull: LeastPull = 0.0
 
 
 def virtual_forces(p: Params, xi: Pair, previous_xi: Pair, h: float) -> Pair:
@@ -87,8 +99,21 @@ def virtual_force(viscosity: float, floor: float, xi: float, previous_xi: float,
     return viscosity * log(xi / previous_xi) / h  # Eq. (5)
 
 
+def with_least_pull(
+    least_pull: float, stiffness: float, f_p: float, opening: float, way: float
+) -> float:
+    """f_p in N, and what the pull lacks of a finger that is `way` in m outside its target.
+
+    `opening` is the direction in which the finger opens. Inside, the pull is K_a1·way at most: so
+    the virtual object ends least_pull/K_a1 beyond the target.
+    """
+    if least_pull <= 0.0:
+        return f_p
+    return f_p - opening * max(0.0, least_pull - stiffness * max(0.0, way))
+
+
 def advance(
-    p: Gains, x_v1: Motions, old_target: Motion, new_target: Motion, f_p: Pair, h: float
+    p: Params, x_v1: Motions, old_target: Motion, new_target: Motion, f_p: Pair, h: float
 ) -> Motions:
     """The virtual objects of both fingers h seconds later, Eq. (6), the forces f_p in N held.
 
@@ -96,7 +121,10 @@ def advance(
     """
     a = impedance.transition(p.mass, p.damping, p.stiffness, h)
     x_1, x_2 = x_v1
-    f_1, f_2 = f_p
+    target, _ = old_target
+    least, k = p.least_pull, p.stiffness
+    f_1 = with_least_pull(least, k, f_p[0], 1.0, x_1[0] - target)
+    f_2 = with_least_pull(least, k, f_p[1], -1.0, target - x_2[0])
     return (
         follow(p, a, x_1, old_target, new_target, f_1),
         follow(p, a, x_2, old_target, new_target, f_2),

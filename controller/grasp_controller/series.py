@@ -11,6 +11,7 @@ from typing import Annotated, NamedTuple, TypeAlias
 from block_variables import Input, Output
 
 from . import contact_force as layer_1
+from . import grip
 from . import impact_reduction as layer_2
 from . import simultaneous_contact as layer_3
 from .impact_reduction import Pair as Pair
@@ -54,6 +55,8 @@ class State(NamedTuple):
     intensity: Pair
     simultaneous_contact_force: float
     impact_reduction_force: Pair
+    grip: grip.State
+    light_rate: Pair
 
 
 Force = Annotated[
@@ -105,7 +108,9 @@ def initial_state(p: Params, u: Inputs) -> State:
     """Virtual objects at the measured fingers and at rest, so that nothing jumps at the start."""
     x_1, x_2 = u.position
     f_s = layer_3.virtual_force(p.simultaneous_contact, u.intensity)
-    return State(_middle(u), ((x_1, 0.0), (x_2, 0.0)), u.intensity, f_s, (0.0, 0.0))
+    nothing = (0.0, 0.0)
+    at_rest = (x_1, 0.0), (x_2, 0.0)
+    return State(_middle(u), at_rest, u.intensity, f_s, nothing, grip.AT_REST, nothing)
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
@@ -123,25 +128,88 @@ def advance(p: Params, x: State, u: Inputs, f_s: float, h: float) -> State:
     virtual = (new_target, new_target)
     if p.impact_reduction.enabled:
         virtual = layer_2.advance(p.impact_reduction, x.virtual, old_target, new_target, f_p, h)
-    return State(new_target, virtual, u.intensity, f_s, f_p)
+    gripping, light_rate = _gripped(p, x, u, h)
+    return State(new_target, virtual, u.intensity, f_s, f_p, gripping, light_rate)
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """The forces for the samples u; a layer that is off passes on the layer above."""
     target = x.target if p.simultaneous_contact.enabled else _middle(u)
-    virtual_1, virtual_2 = x.virtual if p.impact_reduction.enabled else (target, target)
-    x_1, x_2 = u.position
-    v_1, v_2 = u.velocity
+    virtual_1, virtual_2 = virtual = _virtual(p, x, u)
+    u_1, u_2 = layer_forces(p, virtual, u)
+    force = p.contact_force.grip_force
+    if force > 0.0:
+        more = grip.change(force, 0.5 * u_2 - 0.5 * u_1, brake(p.contact_force, u), x.grip.share)
+        u_1, u_2 = u_1 - more, u_2 + more
     return Outputs(
-        (
-            layer_1.force(p.contact_force, x_1, v_1, virtual_1),
-            layer_1.force(p.contact_force, x_2, v_2, virtual_2),
-        ),
+        (u_1, u_2),
         target[0],
         (virtual_1[0], virtual_2[0]),
         x.simultaneous_contact_force,
         x.impact_reduction_force,
     )
+
+
+def published_squeeze(p: Params, x: State, u: Inputs) -> float:
+    """(u_2 - u_1)/2 in N by Eq. (7), whatever the grip force is."""
+    u_1, u_2 = layer_forces(p, _virtual(p, x, u), u)
+    return 0.5 * u_2 - 0.5 * u_1
+
+
+def layer_forces(p: Params, virtual: layer_2.Motions, u: Inputs) -> Pair:
+    """u_j in N by Eq. (7)."""
+    virtual_1, virtual_2 = virtual
+    x_1, x_2 = u.position
+    v_1, v_2 = u.velocity
+    return (
+        layer_1.force(p.contact_force, x_1, v_1, virtual_1),
+        layer_1.force(p.contact_force, x_2, v_2, virtual_2),
+    )
+
+
+def _virtual(p: Params, x: State, u: Inputs) -> layer_2.Motions:
+    """The virtual objects of layer 1."""
+    target = x.target if p.simultaneous_contact.enabled else _middle(u)
+    return x.virtual if p.impact_reduction.enabled else (target, target)
+
+
+def brake(p: layer_1.Params, u: Inputs) -> float:
+    """D_i·v in N, v being the mean speed at which the fingers close."""
+    v_1, v_2 = u.velocity
+    return p.damping * (0.5 * v_2 - 0.5 * v_1)
+
+
+def _gripped(p: Params, x: State, u: Inputs, h: float) -> tuple[grip.State, Pair]:
+    """How far the grip force has come h seconds later, and the rates of the light in 1/s."""
+    squeeze, floor = published_squeeze(p, x, u), p.impact_reduction.intensity_floor
+    return gripped(p.contact_force, floor, squeeze, x.grip, x.light_rate, x.intensity, u, h)
+
+
+def gripped(
+    p: layer_1.Params,
+    floor: float,
+    squeeze: float,
+    x: grip.State,
+    rates: Pair,
+    previous_xi: Pair,
+    u: Inputs,
+    h: float,
+) -> tuple[grip.State, Pair]:
+    """How far the grip force has come h seconds later, and the rates of the light in 1/s.
+
+    The squeeze by Eq. (7) in N and the samples u are held; the intensities before them are in V.
+    """
+    force = p.grip_force
+    if force <= 0.0:
+        return grip.AT_REST, (0.0, 0.0)
+    (xi_1, xi_2), (before_1, before_2), (rate_1, rate_2) = u.intensity, previous_xi, rates
+    rate_1 = grip.light_rate(floor, rate_1, xi_1, before_1, h)
+    rate_2 = grip.light_rate(floor, rate_2, xi_2, before_2, h)
+    quiet = grip.quiet(rate_1) * grip.quiet(rate_2)
+    braked = brake(p, u)
+    pressed = squeeze + braked + grip.change(force, squeeze, braked, x.share)
+    v_1, v_2 = u.velocity
+    return grip.advance(x, pressed, v_1 - v_2, quiet, h), (rate_1, rate_2)
 
 
 def _middle(u: Inputs) -> Motion:

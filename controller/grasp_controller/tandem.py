@@ -18,12 +18,12 @@ from typing import Annotated, NamedTuple, TypeAlias
 from block_variables import Group, Output, Parameter
 
 from . import contact_force as layer_1
-from . import holding, impedance, reflectance_ratio, wrist_guidance
+from . import grip, holding, impedance, reflectance_ratio, wrist_guidance
 from . import impact_reduction as layer_2
 from . import simultaneous_contact as published
 from .impedance import Motion
 from .reflectance_ratio import EstimatedGap, Line, Ratio, RatioDeviation
-from .series import ImpactReductionForce
+from .series import ImpactReductionForce, brake, gripped
 from .series import Inputs as Inputs
 from .wrist_guidance import Wrist
 
@@ -92,6 +92,8 @@ class State(NamedTuple):
     closing: float
     lasting: float
     hold: float
+    grip: grip.State
+    light_rate: layer_2.Pair
 
 
 GripForce: TypeAlias = Annotated[
@@ -160,7 +162,7 @@ def initial_state(p: Params, u: Inputs) -> State:
     nothing = (0.0, 0.0)
     return State(
         virtual, middle, target, u.position, u.intensity, nothing,
-        line_1, line_2, estimate, 0.0, 0.0, 0.0,
+        line_1, line_2, estimate, 0.0, 0.0, 0.0, grip.AT_REST, nothing,
     )  # fmt: skip
 
 
@@ -168,7 +170,7 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance virtual opening and wrist by h seconds (h > 0), the samples u held, and learn."""
     v_1, v_2 = u.velocity
     closing = holding.filtered(p.hold, x.closing, v_1 - v_2, h)
-    pressed = holding.pressed(p.hold, -0.5 * _grip_force(p, x.virtual, u), closing)
+    pressed = holding.pressed(p.hold, -0.5 * _published_force(p, x.virtual, u), closing)
     lasting = holding.lasting(p.hold, x.lasting, pressed, h)
     touching_1 = holding.touching(p.hold, p.reflectance, x.line_1, lasting)
     touching_2 = holding.touching(p.hold, p.reflectance, x.line_2, lasting)
@@ -191,9 +193,13 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
         pull = max(SOFTEST, power(1.0 - rho * rho, p.simultaneous_contact.patience))
     f_p = layer_2.virtual_forces(p.impact_reduction, u.intensity, x.intensity, h)
     virtual = _closed(p, x.virtual, pull, f_p, h)
+    squeeze = -0.5 * _published_force(p, x.virtual, u)
+    gripping, light_rate = gripped(
+        p.contact_force, floor, squeeze, x.grip, x.light_rate, x.intensity, u, h
+    )
     return State(
         virtual, wrist_command, target, x.fingertips, u.intensity, f_p,
-        line_1, line_2, estimate, closing, lasting, hold,
+        line_1, line_2, estimate, closing, lasting, hold, gripping, light_rate,
     )  # fmt: skip
 
 
@@ -201,7 +207,7 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """The commands for the samples u, and what has been learnt."""
     ratio = reflectance_ratio.learnt(x.estimate)
     return Outputs(
-        _grip_force(p, x.virtual, u),
+        _grip_force(p, x, u),
         x.wrist_command,
         x.target,
         x.virtual[0],
@@ -252,10 +258,22 @@ def _closed(p: Params, virtual: Motion, pull: float, f_p: layer_2.Pair, h: float
     stiffness = pull * gains.stiffness
     a = impedance.transition(gains.mass, gains.damping, stiffness, h)
     half, rate = virtual
-    return impedance.advance(a, half, rate, 0.5 * (f_1 - f_2) / stiffness)  # (6T)
+    least, mean = gains.least_pull, 0.5 * (f_1 - f_2)
+    closing = layer_2.with_least_pull(least, gains.stiffness, mean, pull, half)
+    return impedance.advance(a, half, rate, closing / stiffness)  # (6T)
 
 
-def _grip_force(p: Params, virtual: Motion, u: Inputs) -> float:
-    """F in N, layer 1, Eq. (7T)."""
+def _grip_force(p: Params, x: State, u: Inputs) -> float:
+    """F in N: twice what a finger presses with, below 0."""
+    published = _published_force(p, x.virtual, u)
+    force = p.contact_force.grip_force
+    if force <= 0.0:
+        return published
+    braked = brake(p.contact_force, u)
+    return published - 2.0 * grip.change(force, -0.5 * published, braked, x.grip.share)
+
+
+def _published_force(p: Params, virtual: Motion, u: Inputs) -> float:
+    """F in N, layer 1, Eq. (7T), whatever the grip force is."""
     v_1, v_2 = u.velocity
     return 2.0 * layer_1.force(p.contact_force, _half_opening(u), 0.5 * (v_1 - v_2), virtual)

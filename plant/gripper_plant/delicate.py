@@ -360,9 +360,9 @@ def _felt(
         touch_1 = touch.pressed(touch_1, begin, d, f_1)
     if touch.touches(gap_2, next_gaps[1], f_2):
         if touch_2.first_time < 0.0:
-            free_s, _ = friction.move(x_2, v_2, m_2, u_2, friction_2, d)
+            free_s, _ = friction.move(-x_2, -v_2, m_2, 0.0 - u_2, friction_2, d)
             pushed, _ = friction.move(middle, speed, p.object_mass, 0.0 - f_1, floor, d)
-            free_gap = gap_2 - (free_s - x_2) + (pushed - middle)
+            free_gap = gap_2 + (free_s + x_2) + (pushed - middle)
             moment, closing = touch.meeting(gap_2, speed - v_2, free_gap, d)
             touch_2 = touch.met(touch_2, begin + moment, closing)
         touch_2 = touch.pressed(touch_2, begin, d, f_2)

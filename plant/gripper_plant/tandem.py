@@ -284,13 +284,15 @@ def _substep(
             break
         f_1, f_2, drive_force = new_f_1, new_f_2, new_drive_force
     touch_1, touch_2 = x.touch
+    old_f_1 = f_1 if touch_1.first_time >= 0.0 else 0.0
+    old_f_2 = f_2 if touch_2.first_time >= 0.0 else 0.0
     if touch.touches(gap_1, next_gap_1, f_1):
         if touch_1.first_time < 0.0:
-            touch_1 = _met(p, a, x, command, (drive_force, 0.0, f_2), 1.0, d, begin)
+            touch_1 = _met(p, a, x, command, (drive_force, 0.0, old_f_2), 1.0, d, begin)
         touch_1 = touch.pressed(touch_1, begin, d, f_1)
     if touch.touches(gap_2, next_gap_2, f_2):
         if touch_2.first_time < 0.0:
-            touch_2 = _met(p, a, x, command, (drive_force, f_1, 0.0), -1.0, d, begin)
+            touch_2 = _met(p, a, x, command, (drive_force, old_f_1, 0.0), -1.0, d, begin)
         touch_2 = touch.pressed(touch_2, begin, d, f_2)
     toppled = x.toppled or standing.topples(q, box)
     if toppled:

@@ -182,6 +182,13 @@ def test_one_of_other_sources_stays_as_it_is(command, altered):
     assert {name for name, fmu in ran("a").items() if "native_twin_of" not in fmu} == {"plant"}
 
 
+OF_SAMPLES = (
+    "plant lacks contact_impulse, first_contact_time, impact_velocity, touched, impact_impulse: "
+    "metrics have contacts as the samples show them\n"
+)
+"""The note on a plant that does not tell contacts between two samples."""
+
+
 def test_a_block_of_ones_own(command, tmp_path):
     """Its twin is one that the user has built, of the same source."""
     shutil.copy(SPRING, tmp_path)
@@ -189,15 +196,19 @@ def test_a_block_of_ones_own(command, tmp_path):
     build_block(source, Path("fmus/build"))
     python = recorded(command, "a", *SWAP)
     without = "no native FMU runs as plant (SpringPlant.fmu has no native twin)\n"
-    assert command("run", *SWAP, "--native")[2] == without
+    assert command("run", *SWAP, "--native")[2] == without + OF_SAMPLES
     build_block(source, Path("fmus/native"), planned())
     assert recorded(command, "b", *SWAP, "--native") == python
     assert "native_twin_of" in ran("b")["plant"]
     source.write_text(source.read_text("utf-8") + "\n# another\n", "utf-8")
     build_block(source, Path("fmus/build"))
-    assert command("run", *SWAP)[2] == (
-        "no native FMU runs as plant (fmus/native/SpringPlant.fmu is not the twin of this "
-        "SpringPlant.fmu, or not for this machine)\n"
+    assert (
+        command("run", *SWAP)[2]
+        == (
+            "no native FMU runs as plant (fmus/native/SpringPlant.fmu is not the twin of this "
+            "SpringPlant.fmu, or not for this machine)\n"
+        )
+        + OF_SAMPLES
     )
 
 

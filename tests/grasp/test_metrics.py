@@ -393,3 +393,62 @@ def test_every_metric_has_a_unit_and_a_label(snapshot):
     assert shown == snapshot
     assert len(OF_OBJECT) == 9
     assert {m.name for m in METRICS if m.reason} == OF_FREE_FINGERS
+
+
+def felt(time, moment, speed, impulse, impact):
+    """What a plant tells of fingers that touch then, both alike; impulses as functions of time."""
+    begun = time >= moment
+    signals = {}
+    for j, side in OPENING.items():
+        signals |= {
+            f"plant.contact_impulse[{j}]": side * np.array([impulse(t) for t in time]),
+            f"plant.first_contact_time[{j}]": np.where(begun, moment - time[0], -1.0),
+            f"plant.impact_velocity[{j}]": np.where(begun, speed, 0.0),
+            f"plant.touched[{j}]": begun,
+            f"plant.impact_impulse[{j}]": side * np.array([impact(t) for t in time]),
+        }
+    return signals
+
+
+@pytest.mark.parametrize("start", [0.0, 7.0])
+def test_a_contact_between_two_samples_is_that_of_the_plant(start):
+    """A finger that bounces each 2 ms, seen each 4 ms: no sample has a gap of 0 or a force."""
+    time = start + every(4e-3, 0.4)
+    away = {f"plant.{name}[{j}]": np.zeros(len(time)) for name in ("contact_force", "contact")
+            for j in OPENING}  # fmt: skip
+    away |= {f"plant.gap[{j}]": np.full(len(time), 1e-5) for j in OPENING}
+    moment = start + 0.0107
+
+    def bounces(t):
+        return 6e-3 * max(0.0, (t - moment) // 2e-3 + 1.0)
+
+    values = grasp_metrics(
+        time, away | felt(time, moment, 5e-3, bounces, lambda t: min(bounces(t), 0.06))
+    )
+    assert values["time_to_contact"] == pytest.approx([moment] * 2, rel=1e-12)
+    assert values["impact_velocity"] == [5e-3] * 2
+    assert values["impact_impulse"] == pytest.approx([0.06] * 2)
+    assert values["steady_contact_force"] == pytest.approx([3.0] * 2)
+    assert "remaining_gap" not in values
+    assert values["peak_contact_force"] == [0.0, 0.0]
+
+
+def test_a_plant_that_began_later_than_the_run_tells_no_time_of_it():
+    """It was initialised again: its moment is none of the step that the samples show."""
+    time, signals = pressing(lambda t: 3.0, 0.3)
+    plain = grasp_metrics(time, signals)
+    told = felt(time, 0.1004, 0.2, lambda t: 3.0 * max(0.0, t - 0.1004), lambda t: 0.06)
+    for j in OPENING:
+        told[f"plant.first_contact_time[{j}]"] -= 0.05 * (time >= 0.1004)
+    assert grasp_metrics(time, signals | told)["time_to_contact"] == plain["time_to_contact"]
+    assert grasp_metrics(time, signals | told)["impact_velocity"] == plain["impact_velocity"]
+    for j in OPENING:  # and an impulse that falls is none
+        told[f"plant.contact_impulse[{j}]"][-5:] = 0.0
+    found = grasp_metrics(time, signals | told)["steady_contact_force"]
+    assert found == plain["steady_contact_force"]
+
+
+def test_an_impulse_needs_a_run_that_has_its_window():
+    time, signals = pressing(lambda t: 3.0, 0.119)
+    told = felt(time, 0.1004, 0.1, lambda t: 3.0 * max(0.0, t - 0.1004), lambda t: 0.05)
+    assert grasp_metrics(time, signals | told)["impact_impulse"] == [None, None]

@@ -20,7 +20,9 @@ VALUES = (
     "{ object_width = 0.07, initial_object_position = 0.03 }",
     "{ object_width = 70.0, initial_object_position = 30.0 }",
 )
-NAMED = {"gap": "mm", "position": "mm", "velocity": "mm/s", "contact_force": "mN", "force": "mN"}
+NAMED = {"gap": "mm", "position": "mm", "velocity": "mm/s", "contact_force": "mN", "force": "mN",
+         "contact_impulse": "mN.s", "first_contact_time": "ms", "impact_velocity": "mm/s",
+         "impact_impulse": "mN.s"}  # fmt: skip
 ENTRY = ", ".join(
     [f'"{name}[{j}]" = "{unit}"' for name, unit in NAMED.items() for j in (1, 2)]
     + [f'{name} = "mm"' for name in ("object_position", "object_width", "initial_object_position")]
@@ -178,6 +180,19 @@ class Outputs(NamedTuple):
     contact_force: Annotated[Pair, Output("f_cj", unit="mN", nominal=1e3, depends_on=set())]
     contact: Annotated[tuple[bool, bool], Output("the finger touches", depends_on=set())]
     object_position: Annotated[float, Output("x_m", unit="mm", nominal=100.0, depends_on=set())]
+    contact_impulse: Annotated[
+        Pair, Output("impulse", unit="mN.s", nominal=1.0, depends_on=set())
+    ]
+    first_contact_time: Annotated[
+        Pair, Output("first contact", unit="ms", nominal=1.0, depends_on=set())
+    ]
+    impact_velocity: Annotated[
+        Pair, Output("its speed", unit="mm/s", nominal=1.0, depends_on=set())
+    ]
+    touched: Annotated[tuple[bool, bool], Output("touched since", depends_on=set())]
+    impact_impulse: Annotated[
+        Pair, Output("of 20 ms", unit="mN.s", nominal=1.0, depends_on=set())
+    ]
 
 
 def _pair(pair: Pair, factor: float = 1e3) -> Pair:
@@ -200,7 +215,9 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     y = rigid.outputs(_si(p), x, rigid.Inputs())
     pairs = (_pair(y.position), _pair(y.velocity), _pair(y.gap), _pair(y.contact_force))
-    return Outputs(*pairs, y.contact, 1e3 * y.object_position)
+    felt = _pair(y.contact_impulse), _pair(y.first_contact_time), _pair(y.impact_velocity)
+    others = y.contact, 1e3 * y.object_position
+    return Outputs(*pairs, *others, *felt, y.touched, _pair(y.impact_impulse))
 '''
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..metrics.groups import Group
-from .metrics import METRICS
+from .metrics import METRICS, check
 
 if TYPE_CHECKING:
     from ..recording.result import View
@@ -17,4 +17,4 @@ def _view() -> View:
     return VIEW
 
 
-GROUP = Group(METRICS, view=_view)
+GROUP = Group(METRICS, check, view=_view)

@@ -34,10 +34,17 @@ QUANTITIES: Mapping[str, str | None] = {
 }  # fmt: skip
 """The outputs of a plant on each of its fingers, and their units."""
 
+FELT: Mapping[str, str | None] = {
+    "contact_impulse": "N.s", "first_contact_time": "s", "impact_velocity": "m/s", "touched": None,
+    "impact_impulse": "N.s",
+}  # fmt: skip
+"""The outputs of our plants on what each finger has felt, also between two samples: touch.py."""
+
 
 def of_each(*quantities: str) -> dict[str, str | None]:
     """The signals that are these quantities of each finger, and their units."""
-    return {f"plant.{name}[{j}]": QUANTITIES[name] for name in quantities for j in FINGERS}
+    units = {**QUANTITIES, **FELT}
+    return {f"plant.{name}[{j}]": units[name] for name in quantities for j in FINGERS}
 
 
 OBJECT_POSITION: Mapping[str, str | None] = {"plant.object_position": "m"}
@@ -51,7 +58,7 @@ TOUCH: Mapping[Need, str | None] = {
 }
 """What tells whether each finger touches."""
 
-CONTACT_SIGNALS = of_each(*QUANTITIES)
+CONTACT_SIGNALS = of_each(*QUANTITIES, *FELT)
 """What tells when each finger touches, and how fast; a plant may lack some of them."""
 
 SCENE_SIGNALS = (*of_each("position", "velocity", "gap", "contact_force"), *OBJECT_POSITION)
@@ -62,6 +69,9 @@ IMPACT_WINDOW = 0.02
 
 STEADY_WINDOW = 0.1
 """The steady contact force is the mean over the last so many seconds."""
+
+SAME_MOMENT = 1e-7
+"""s by which a moment of the plant and one of the run may differ."""
 
 SETTLED = 0.02
 """A force has settled once it stays so near to the steady one, as a share of that."""
@@ -114,9 +124,9 @@ FROM_CONTACT: Mapping[str, Any] = {"needs": TOUCH, "uses": CONTACT_SIGNALS}
 
 @of_fingers("time_to_contact", "s", none="nothing was touched", **FROM_CONTACT)
 def time_to_contact(signals: Signals, finger: int) -> float | None:
-    """Moment where the gap of the last free sample runs out at its rate; None: never touches.
+    """Moment of the first contact, of the plant or of the samples; None: never touches.
 
-    Of a plant without gaps it is that of the first sample in contact, as in first_contact().
+    first_contact() has it where the plant does not tell it.
     """
     contact = first_contact(signals, finger)
     return contact.time if contact else None
@@ -130,33 +140,38 @@ def time_difference(signals: Signals) -> float | None:
     return max(times) - min(times) if len(times) == len(contacts) else None
 
 
-FROM_GAP: Mapping[str, Any] = {"needs": of_each("gap"), "uses": of_each("contact"), "reason": True}
+FROM_GAP: Mapping[str, Any] = {
+    "needs": of_each("gap"), "uses": of_each("contact", "touched"), "reason": True,
+}  # fmt: skip
 
 
 @of_fingers("remaining_gap", "m", label="gap left, no contact", **FROM_GAP)
 def remaining_gap(signals: Signals, finger: int) -> float | None:
     """Gap at the end of a finger that never touches; None where it does."""
-    return None if touching(signals, finger).any() else float(_gap(signals, finger)[-1])
+    return None if touched(signals, finger).any() else float(_gap(signals, finger)[-1])
 
 
 @of_fingers("smallest_gap", "m", label="smallest gap left", **FROM_GAP)
 def smallest_gap(signals: Signals, finger: int) -> float | None:
     """Smallest gap of a finger that never touches; None where it does."""
-    return None if touching(signals, finger).any() else float(_gap(signals, finger).min())
+    return None if touched(signals, finger).any() else float(_gap(signals, finger).min())
 
 
 @of_fingers("impact_velocity", "m/s", needs=of_each("gap"), uses=CONTACT_SIGNALS)
 def impact_velocity(signals: Signals, finger: int) -> float | None:
     """Rate at which the gap closes at first contact; None where it does not close.
 
-    Of a plant without positions or velocities it is a mean over its last free step.
+    It is that of the plant, or of the last free sample. Of a plant without positions or velocities
+    it is a mean over its last free step.
     """
     contact = first_contact(signals, finger)
     speed = contact.speed if contact else None
     return speed if speed is not None and speed > 0.0 else None
 
 
-FROM_FORCE: Mapping[str, Any] = {"needs": of_each("contact_force")}
+FROM_FORCE: Mapping[str, Any] = {
+    "needs": of_each("contact_force"), "uses": of_each("contact_impulse"),
+}  # fmt: skip
 FROM_FORCE_SINCE_CONTACT: Mapping[str, Any] = {
     "needs": {**TOUCH, **of_each("contact_force")},
     "uses": CONTACT_SIGNALS,
@@ -165,12 +180,15 @@ FROM_FORCE_SINCE_CONTACT: Mapping[str, Any] = {
 
 @of_fingers("impact_impulse", "N.s", **FROM_FORCE_SINCE_CONTACT)
 def impact_impulse(signals: Signals, finger: int) -> float | None:
-    """Impulse of the contact force over IMPACT_WINDOW from first contact, by trapezoids.
+    """Impulse over IMPACT_WINDOW from first contact, of the plant or by trapezoids.
 
-    Until the first sample the force is taken as it is there, as one that begins with a jump has it.
-    None if the run ends sooner, or with fewer than two samples.
+    None if the run ends sooner. The trapezoids begin with the force of the first sample, as one
+    that begins with a jump has it. They need two samples.
     """
     times, force = since_contact(signals, finger)
+    of_plant = f"plant.impact_impulse[{finger}]"
+    if of_plant in signals and _contact_of_plant(signals, finger):
+        return abs(float(signals[of_plant][-1])) if times[-1] >= IMPACT_WINDOW else None
     if np.count_nonzero(times <= IMPACT_WINDOW) < 2 or times[-1] < IMPACT_WINDOW:
         return None
     samples = times[(times > 0.0) & (times < IMPACT_WINDOW)]
@@ -186,7 +204,7 @@ def peak_contact_force(signals: Signals, finger: int) -> float:
 
 @of_fingers("steady_contact_force", "N", **FROM_FORCE)
 def steady_contact_force(signals: Signals, finger: int) -> float:
-    """Mean contact force over the last STEADY_WINDOW."""
+    """Mean contact force over the last STEADY_WINDOW: of the plant's impulse, or of the samples."""
     return steady_force(signals, finger)
 
 
@@ -335,6 +353,17 @@ METRICS = tuple(_metrics)
 """The metrics of a grasp, in the order in which they are shown."""
 
 
+def check(system: Any) -> tuple[str, ...]:
+    """A note where the plant does not tell what its fingers feel between two samples."""
+    plant = system.roles.get("plant", "plant")
+    variables = {c.name: c.interface.by_name for c in system.components}
+    names = variables.get(plant, {})
+    missing = [name for name in FELT if f"{name}[1]" not in names]
+    if not missing or "gap[1]" not in names:
+        return ()
+    return (f"{plant} lacks {', '.join(missing)}: metrics have contacts as the samples show them",)
+
+
 def is_grasp(signals: Signals) -> bool:
     """True if there are the signals of a gripper plant and its object that a picture shows."""
     return all(name in signals for name in SCENE_SIGNALS)
@@ -386,15 +415,34 @@ def _force(signals: Signals, finger: int) -> Floats:
     return force
 
 
+def _last_impulses(signals: Signals, finger: int) -> Floats:
+    """Magnitudes of the plant's impulse over the last STEADY_WINDOW, N.s; none if it tells none."""
+    name = f"plant.contact_impulse[{finger}]"
+    if name not in signals:
+        return np.empty(0)
+    impulse: Floats = np.abs(signals[name][_steady_row(signals) :])
+    return impulse
+
+
+def _steady_row(signals: Signals) -> int:
+    """The row where the last STEADY_WINDOW begins."""
+    return int(np.searchsorted(signals.time, signals.time[-1] - STEADY_WINDOW))
+
+
 def _last_forces(signals: Signals, finger: int) -> Floats:
     """The contact force over the last STEADY_WINDOW, N."""
-    first_row = int(np.searchsorted(signals.time, signals.time[-1] - STEADY_WINDOW))
-    return _force(signals, finger)[first_row:]
+    return _force(signals, finger)[_steady_row(signals) :]
 
 
 def steady_force(signals: Signals, finger: int) -> float:
-    """The mean contact force over the last STEADY_WINDOW, N."""
-    return float(_last_forces(signals, finger).mean())
+    """The mean contact force over the last STEADY_WINDOW, N.
+
+    The plant's impulse has it, whatever the force does between two samples; else they have it.
+    """
+    impulse = _last_impulses(signals, finger)
+    if len(impulse) < 2 or (np.diff(impulse) < 0.0).any():  # a plant that began again in the run
+        return float(_last_forces(signals, finger).mean())
+    return float(impulse[-1] - impulse[0]) / float(np.ptp(signals.time[-len(impulse) :]))
 
 
 def held_force(signals: Signals, finger: int) -> float | None:
@@ -421,12 +469,19 @@ def touching(signals: Signals, finger: int) -> Flags:
     return _gap(signals, finger) <= 0.0
 
 
+def touched(signals: Signals, finger: int) -> Flags:
+    """Whether a finger touches or has touched since the row before, as far as the plant tells."""
+    name = f"plant.touched[{finger}]"
+    return signals[name].astype(bool) if name in signals else touching(signals, finger)
+
+
 def first_contact(signals: Signals, finger: int) -> FirstContact | None:
     """First contact of a finger; None if it never touches. Most metrics ask for it.
 
-    Between the last free communication point and the first one in contact, the gap runs out at the
-    rate of the last free point. Without a gap it is the first point in
-    contact: late by a step at most, but recorded, as are all later contacts.
+    A plant that tells its time and speed has them, also of a contact between two samples. Of
+    others the gap runs out at the rate of the last free communication point, before the first one
+    in contact. Without a gap it is the first point in contact: late by a step at most, but
+    recorded, as are all later contacts.
     """
     key = first_contact, finger
     if key not in signals.worked_out:
@@ -437,6 +492,8 @@ def first_contact(signals: Signals, finger: int) -> FirstContact | None:
 
 def _first_contact(signals: Signals, finger: int) -> FirstContact | None:
     """First contact of a finger, worked out again."""
+    if of_plant := _contact_of_plant(signals, finger):
+        return of_plant
     time = signals.time
     rows = np.flatnonzero(touching(signals, finger))
     if not len(rows):
@@ -450,6 +507,28 @@ def _first_contact(signals: Signals, finger: int) -> FirstContact | None:
     span = float(time[row] - time[k])
     wait = min(gap / speed, span) if speed > 0.0 else span
     return FirstContact(float(time[k]) + wait, speed, row)
+
+
+def _contact_of_plant(signals: Signals, finger: int) -> FirstContact | None:
+    """First contact as the plant tells it, since the start of the run; None where it does not.
+
+    Nor does it where it has begun later than the run, as one that was initialised again: the moment
+    is then none in the last step before the first row that knows it.
+    """
+    names = [f"plant.{name}[{finger}]" for name in ("first_contact_time", "impact_velocity")]
+    if not all(name in signals for name in names):
+        return None
+    since_start, speed = (signals[name] for name in names)
+    rows = np.flatnonzero(since_start >= 0.0)
+    if not len(rows):
+        return None
+    row, time = int(rows[0]), signals.time
+    moment = float(time[0] + since_start[row])
+    last_step = _last_step(signals, row - 1) if row else None
+    earliest = time[last_step[1] if last_step else 0]
+    if not earliest - SAME_MOMENT <= moment <= time[row] + SAME_MOMENT:
+        return None
+    return FirstContact(moment, float(speed[row]), row)
 
 
 def _closing_speed(signals: Signals, finger: int, k: int) -> float:

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError
+from ..grasp.metrics import FELT, QUANTITIES, SCENE_SIGNALS, fingers_of, steady_force
 from ..grasp.metrics import METRICS as OF_GRASP
-from ..grasp.metrics import QUANTITIES, SCENE_SIGNALS, fingers_of, steady_force
+from ..grasp.metrics import check as check_grasp
 from ..grasp.presets import start_in_si
 from ..metrics.metric import ALL, Metric, Signals, expanded, metric, resolved
 from .weights import balance_weights, imbalance
@@ -58,6 +59,7 @@ def directions(signals: Signals) -> list[float]:
     unit="N",
     label="net force",
     needs={f"plant.contact_force{ALL}": QUANTITIES["contact_force"]},
+    uses={f"plant.contact_impulse{ALL}": FELT["contact_impulse"]},
     group="hand",
 )
 def net_force(signals: Signals) -> float:
@@ -74,7 +76,7 @@ def object_turn(signals: Signals) -> float:
 
 
 def check(system: Any) -> tuple[str, ...]:
-    """No notes; InputError where the weights of a system's controller do not balance its fingers.
+    """The notes of a grasp; InputError where the controller's weights do not balance the fingers.
 
     No line is on a plant or a controller of others, which has other parameters.
     """
@@ -97,7 +99,7 @@ def check(system: Any) -> tuple[str, ...]:
             f"{system.name}: {controller}.weight = {weights_text}: leaves {push:.3g} of the grasp "
             f"as a push to one side with the angles of {plant}; balanced by {balanced}"
         )
-    return ()
+    return check_grasp(system)
 
 
 METRICS = (

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..grasp.metrics import METRICS as OF_GRASP
+from ..grasp.metrics import check as check_grasp
 from ..grasp.metrics import is_grasp
 from ..grasp.presets import start_in_si
 from ..metrics.metric import Signals, metric
@@ -77,6 +78,7 @@ def check(system: Any) -> tuple[str, ...]:
     wrist = WristParameters(*parameters)
     published = "wrist_force" in variables.get(controller, ())
     return (
+        *check_grasp(system),
         *_lagging(controller, wrist),
         *_unlike_counted_on(plant, controller, wrist),
         *(_not_following(plant, wrist) if published else ()),

@@ -1,5 +1,6 @@
 """Friction from a log: of our own simulation with noise, and of a model that scipy integrates."""
 
+import zipfile
 from dataclasses import replace
 
 import numpy as np
@@ -329,3 +330,16 @@ def test_what_a_log_is_taken_to_be_in_is_said(tmp_path):
         "b: no unit; taken to be in SI units",
         "c [raw]: not a known unit; taken to be in SI units",
     ]
+
+
+def test_a_plant_that_knows_of_no_friction_of_the_inner_way(grasp, recorded, fmus, tmp_path):
+    """One of a user, which has other friction parameters only."""
+    theirs = tmp_path / "Theirs.fmu"
+    with zipfile.ZipFile(fmus / "GripperPlant.fmu") as ours, zipfile.ZipFile(theirs, "w") as out:
+        for name in ours.namelist():
+            content = ours.read(name)
+            if name == "modelDescription.xml":
+                content = content.replace(b'"friction.inner', b'"friction.of_theirs')
+            out.writestr(name, content)
+    found = identified(grasp.swap("plant", theirs), recorded)
+    assert found.estimates == identified(grasp, recorded).estimates

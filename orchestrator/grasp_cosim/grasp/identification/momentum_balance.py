@@ -22,7 +22,7 @@ import numpy as np
 
 from ...base.errors import InputError, nearest
 from ...base.text import counted
-from ...metrics.metric import Signals
+from ...metrics.metric import Signals, resolved
 from ...system.description import System
 from ..metrics import CLOSING, FINGERS
 from ..presets import start_in_si
@@ -109,9 +109,16 @@ def identify_from_log(
 
 
 def _has_inner(system: System, fitted: Sequence[str], finger: int) -> bool:
-    """True if a finger has additional friction on the inner part of its way, or may have."""
+    """True if a finger has additional friction on the inner part of its way, or may have.
+
+    The plant of a user need not know of such friction.
+    """
     name = f"{FRICTION}inner[{finger}]"
-    return name in fitted or start_in_si(system, name) != 0.0
+    if name in fitted:
+        return True
+    component, _, variable = resolved(name, system.roles).partition(".")
+    interface = system.component(component, system.name).interface
+    return variable in interface.by_name and start_in_si(system, name) != 0.0
 
 
 def _windows(log: Signals, finger: int, max_delay: float, place: str, has_inner: bool) -> Windows:
