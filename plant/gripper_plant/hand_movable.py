@@ -17,7 +17,7 @@ from block_variables import Parameter
 from . import contact_laws, fingers, friction, hand_fingers, touch
 from .box import GRAVITY
 from .contact_laws import HuntCrossley, KelvinVoigt
-from .hand_fingers import FAR, Normal, PerFinger, Pose, Ray, Rays, Touches, TouchOfEach
+from .hand_fingers import FAR, Normal, PerFinger, Pose, Ray, Rays, Shape, Touches, TouchOfEach
 from .hand_fingers import Inputs as Inputs
 from .hand_fingers import Outputs as Outputs
 from .hand_size import FINGERS
@@ -29,10 +29,22 @@ LONGEST_STEP = fingers.LONGEST_STEP
 SHALLOW = 1e-3
 """m; a finger that comes through a face is not deeper when it is first seen below it."""
 
+
+class Line(NamedTuple):
+    """Of a normal force: direction, its share along the ray, its lever about the centre in m."""
+
+    x: float
+    y: float
+    share: float
+    lever: float
+
+
 if TYPE_CHECKING:
     Normals = tuple[Normal, ...]
+    Lines = tuple[Line, ...]
 else:
     Normals = tuple[(Normal,) * FINGERS]
+    Lines = tuple[(Line,) * FINGERS]
 
 
 @dataclass(frozen=True)
@@ -191,19 +203,19 @@ def _raw_normals(p: Params, rays: Rays, x: State) -> Normals:
 def _substep(p: Params, rays: Rays, x: State, u: PerFinger, d: float, begin: float) -> State:
     """D seconds from `begin` in s on with the normal forces held.
 
-    They are found by iteration, along the normals at the start.
+    They are found by iteration, and so are the lines along which they act: those of the mean over
+    the way, by which the work of a force is what the contact stores.
     """
     normals = _normals(p, rays, x)
-    ray_shares = tuple(
-        normal.x * ray.x + normal.y * ray.y for normal, ray in zip(normals, rays, strict=True)
-    )
-    forces, body, next_state = x.normal_force, x.body, x
+    forces, next_state, next_normals = x.normal_force, x, normals
+    lines = _lines(p, rays, x, normals, x, normals)
     for _ in range(MAX_FORCE_ITERATIONS):
-        body = _advance_object(p, rays, x, normals, forces, d)
+        lines = _lines(p, rays, x, normals, next_state, next_normals)
+        body = _advance_object(p, x, lines, forces, d)
         moved_fingers = tuple(
-            friction.move(s, v, m, f + share * push, friction.NONE, d)
-            for s, v, m, f, share, push in zip(
-                x.position, x.velocity, p.finger_mass, u, ray_shares, forces, strict=True
+            friction.move(s, v, m, f + line.share * push, friction.NONE, d)
+            for s, v, m, f, line, push in zip(
+                x.position, x.velocity, p.finger_mass, u, lines, forces, strict=True
             )
         )
         tips, rates = tuple(s for s, _ in moved_fingers), tuple(v for _, v in moved_fingers)
@@ -222,7 +234,7 @@ def _substep(p: Params, rays: Rays, x: State, u: PerFinger, d: float, begin: flo
         normal.depth >= 0.0 and (was_inside or normal.depth <= SHALLOW)
         for normal, was_inside in zip(_raw_normals(p, rays, next_state), x.inside, strict=True)
     )
-    felt = _felt(p, rays, x, next_state, normals, ray_shares, u, d, begin)
+    felt = _felt(p, rays, x, next_state, normals, lines, u, d, begin)
     return next_state._replace(inside=inside, touch=felt)
 
 
@@ -232,7 +244,7 @@ def _felt(
     x: State,
     next_state: State,
     normals: Normals,
-    ray_shares: PerFinger,
+    lines: Lines,
     u: PerFinger,
     d: float,
     begin: float,
@@ -251,8 +263,8 @@ def _felt(
     ):
         felt = _met(p, rays, x, normals, touching, forces, u, d, begin)
     return tuple(
-        touch.pressed(one, begin, d, f * share) if touches else one
-        for one, touches, f, share in zip(felt, touching, forces, ray_shares, strict=True)
+        touch.pressed(one, begin, d, f * line.share) if touches else one
+        for one, touches, f, line in zip(felt, touching, forces, lines, strict=True)
     )
 
 
@@ -276,7 +288,7 @@ def _met(
         0.0 if touches and felt.first_time < 0.0 else f
         for touches, felt, f in zip(touching, x.touch, forces, strict=True)
     )
-    body = _advance_object(p, rays, x, normals, old_forces, d)
+    body = _advance_object(p, x, _lines(p, rays, x, normals, x, normals), old_forces, d)
     free_tips = tuple(
         friction.move(s, v, m, f, friction.NONE, d)[0]
         for s, v, m, f in zip(x.position, x.velocity, p.finger_mass, u, strict=True)
@@ -314,9 +326,47 @@ def _met_one(
     return touch.met(felt, begin + moment, speed / share if share > 0.0 else 0.0)
 
 
-def _advance_object(
-    p: Params, rays: Rays, x: State, normals: Normals, forces: PerFinger, d: float
-) -> Body:
+def _lines(
+    p: Params, rays: Rays, x: State, normals: Normals, next_x: State, next_normals: Normals
+) -> Lines:
+    """The lines of the normal forces over the way from one state to another."""
+    return tuple(
+        _line(p, ray, x.body.pose, s, normal, next_x.body.pose, next_s, next_normal)
+        for ray, s, normal, next_s, next_normal in zip(
+            rays, x.position, normals, next_x.position, next_normals, strict=True
+        )
+    )
+
+
+def _line(
+    p: Params,
+    ray: Ray,
+    pose: Pose,
+    s: float,
+    normal: Normal,
+    next_pose: Pose,
+    next_s: float,
+    next_normal: Normal,
+) -> Line:
+    """The line for which the depth changes by what fingertip and object move along it.
+
+    Of a prism, nu·(p - c) changes by the mean of nu times the change of p - c, and the other way
+    round. Of a disc, |p - c| does by the sum of both p - c over the sum of their lengths.
+    """
+    arm_x, arm_y = s * ray.x - pose.x, s * ray.y - pose.y
+    next_arm_x, next_arm_y = next_s * ray.x - next_pose.x, next_s * ray.y - next_pose.y
+    share_before = 0.5
+    if p.shape == Shape.DISC:
+        length, next_length = p.object_radius - normal.depth, p.object_radius - next_normal.depth
+        sum_of_both = length + next_length
+        share_before = length / sum_of_both if sum_of_both > 0.0 else 0.5
+    x = share_before * normal.x + (1.0 - share_before) * next_normal.x
+    y = share_before * normal.y + (1.0 - share_before) * next_normal.y
+    lever = 0.5 * ((arm_x + next_arm_x) * y - (arm_y + next_arm_y) * x)
+    return Line(x, y, x * ray.x + y * ray.y, lever)
+
+
+def _advance_object(p: Params, x: State, lines: Lines, forces: PerFinger, d: float) -> Body:
     """The object d seconds later under normal forces in N, with the friction of the floor.
 
     The floor takes what it can of the speeds that the object would have without it: it comes to
@@ -324,11 +374,10 @@ def _advance_object(
     """
     pose, m = x.body.pose, p.object_mass
     push_x, push_y, moment = 0.0, 0.0, 0.0
-    for ray, s, normal, f in zip(rays, x.position, normals, forces, strict=True):
-        push_x = push_x - f * normal.x
-        push_y = push_y - f * normal.y
-        arm_x, arm_y = s * ray.x - pose.x, s * ray.y - pose.y
-        moment = moment - f * (arm_x * normal.y - arm_y * normal.x)
+    for line, f in zip(lines, forces, strict=True):
+        push_x = push_x - f * line.x
+        push_y = push_y - f * line.y
+        moment = moment - f * line.lever
     # (H1) without the floor
     x_dot, y_dot = x.body.x_dot + d * push_x / m, x.body.y_dot + d * push_y / m
     inertia = m * p.radius_of_gyration * p.radius_of_gyration

@@ -272,3 +272,18 @@ def test_the_impulses_on_a_hand_are_those_of_its_equation():
     for k in range(3):
         momentum = 0.5 * y.velocity[k]
         assert momentum == pytest.approx(y.contact_impulse[k] - 2.0 * 0.4, abs=1e-11)
+
+
+@pytest.mark.parametrize("block", [rigid, compliant, movable, delicate])
+def test_an_object_of_no_width_is_touched(block):
+    """A point between the fingers: contact in closed form, and what they press with."""
+    p = block.Params(object_width=0.0, initial_position=(0.05, 0.01))
+    x, u = block.initial_state(p, block.Inputs()), block.Inputs((-0.5, 0.5))
+    for _ in range(3000):
+        x = block.step(p, x, u, 1e-3)
+    y = block.outputs(p, x, u)
+    moment = sqrt(2.0 * 0.02 / 1.0)
+    assert y.first_contact_time == (pytest.approx(moment, rel=1e-9),) * 2
+    for j, side in enumerate((1.0, -1.0)):  # Eq. (1) over 3 s
+        pressed = side * (y.contact_impulse[j] - 0.5 * y.velocity[j])
+        assert pressed == pytest.approx(1.5, rel=1e-9)

@@ -70,6 +70,9 @@ IMPACT_WINDOW = 0.02
 STEADY_WINDOW = 0.1
 """The steady contact force is the mean over the last so many seconds."""
 
+SHARE_IN_ORDER = 0.1
+"""Share of the work that a sampled exchange may create: 0.6 % in steps of 1 ms, 7 % of 10 ms."""
+
 SAME_MOMENT = 1e-7
 """s by which a moment of the plant and one of the run may differ."""
 
@@ -138,6 +141,31 @@ def time_difference(signals: Signals) -> float | None:
     contacts = [first_contact(signals, j) for j in fingers_of(signals)]
     times = [contact.time for contact in contacts if contact]
     return max(times) - min(times) if len(times) == len(contacts) else None
+
+
+EXCHANGE: Mapping[str, str | None] = {
+    **{f"plant.exchange_energy[{j}]": "J" for j in FINGERS},
+    **{f"controller.force[{j}]": "N" for j in FINGERS},
+    **of_each("position"),
+}
+
+
+@of_fingers(
+    "sampling_energy", "1", factor=1e2, shown_unit="%", label="energy of the sampling",
+    needs=EXCHANGE, optional=True, reason=True,
+)  # fmt: skip
+def sampling_energy(signals: Signals, finger: int) -> float | None:
+    """Energy that the sampled exchange creates, as a share of the work; None up to SHARE_IN_ORDER.
+
+    More of it than that warns: the step is too long for the controller's gains, and the finger is
+    faster than the equations have it. The work is that of the force both ways.
+    """
+    force, position = (
+        signals[f"{name}[{finger}]"] for name in ("controller.force", "plant.position")
+    )
+    work = float(np.abs(force[:-1] * np.diff(position)).sum())
+    created = float(signals[f"plant.exchange_energy[{finger}]"].max())
+    return created / work if created > SHARE_IN_ORDER * work else None
 
 
 FROM_GAP: Mapping[str, Any] = {

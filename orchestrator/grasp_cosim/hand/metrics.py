@@ -103,7 +103,11 @@ def check(system: Any) -> tuple[str, ...]:
 
 
 METRICS = (
-    *(_of_hand(m) for m in OF_GRASP if not m.optional and m.name not in NOT_OF_A_HAND),
+    *(
+        _of_hand(m)
+        for m in OF_GRASP
+        if m.name not in NOT_OF_A_HAND and (not m.optional or m.reason)
+    ),
     net_force,
     object_turn,
 )
