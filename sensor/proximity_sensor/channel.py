@@ -1,6 +1,6 @@
 """One channel of the sensor: the optics, then the electronics, each stage of which can be off.
 
-    optics (Eq. 9, stripes) -> + ambient offset -> + noise -> ADC -> low-pass -> median -> - offset
+    optics (Eq. 9, spot) -> + ambient offset -> + noise -> ADC -> low-pass -> median -> - offset
 
 When it samples, and which gap it sees then: sensor/README.md.
 """
@@ -13,6 +13,7 @@ from block_variables import Parameter
 
 from . import electronics, optics
 from . import noise as random_noise
+from . import spot as finite_spot
 from .optics import check_inputs as check_inputs
 from .optics import outputs as seen
 
@@ -30,7 +31,9 @@ WARM_UP = 100
 class Params(optics.Params):
     """The parameters of the optics and of the stages."""
 
-    pattern: optics.Pattern = optics.Pattern()
+    spot: finite_spot.Spot = finite_spot.Spot()
+    face: finite_spot.Face = finite_spot.Face()
+    pattern: finite_spot.Pattern = finite_spot.Pattern()
     ambient: electronics.Ambient = electronics.Ambient()
     noise: random_noise.Noise = random_noise.Noise()
     adc: electronics.Adc = electronics.Adc()
@@ -65,7 +68,7 @@ class Params(optics.Params):
     @cached_property
     def plain(self) -> bool:
         """True if there is nothing but Eq. (9)."""
-        return not (self.sampled or self.pattern.enabled)
+        return not (self.sampled or self.spot.enabled)
 
     @cached_property
     def coefficients(self) -> electronics.Coefficients:
@@ -129,11 +132,12 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
 
 
 def _light(p: Params, u: Inputs) -> float:
-    """The intensity xi in V, of a striped surface if it is one."""
+    """The intensity xi in V, of the whole spot if it is one."""
     xi = seen(p, u).intensity
-    if not p.pattern.enabled or u.gap > optics.FARTHEST:
+    if not p.spot.enabled or u.gap > optics.FARTHEST:
         return xi
-    return xi * optics.striped(p.pattern, 0.0 if u.gap < 0.0 else u.gap)
+    z_0 = (0.0 if u.gap < 0.0 else u.gap) + p.offset_distance
+    return xi * finite_spot.brightness(p.spot, p.face, p.pattern, p.diffusion_exponent, z_0)
 
 
 def _measured(p: Params, c: Chain, light: float) -> tuple[electronics.Memory, electronics.Window]:

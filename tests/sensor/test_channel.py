@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from proximity_sensor import channel, electronics, noise, optics
+from proximity_sensor import channel, electronics, noise, optics, spot
 from proximity_sensor.channel import Inputs, Params
 from scipy import signal
 from support.declared import parameters
@@ -29,7 +29,7 @@ STAGES = {
 
 
 ON = Params(**{**STAGES, "adc": electronics.Adc(True), "noise": noise.Noise(True, seed=7)})
-"""Everything but the stripes."""
+"""Everything but the spot."""
 
 
 def only(stage, **others):
@@ -75,7 +75,8 @@ def test_off_it_is_the_optics(eye, gap, before):
 
 def test_parameters_of_a_stage_that_is_off_do_nothing():
     p = Params(
-        pattern=optics.Pattern(ratio=0.1),
+        face=spot.Face(100.0),
+        pattern=spot.Pattern(ratio=0.1),
         ambient=electronics.Ambient(offset=1.0, drift=1.0),
         noise=noise.Noise(standard_deviation=1.0),
         adc=electronics.Adc(bits=1),
@@ -85,9 +86,10 @@ def test_parameters_of_a_stage_that_is_off_do_nothing():
     assert run(p, APPROACH, 1e-4) == run(Params(), APPROACH, 1e-4)
 
 
-def test_stripes_alone_need_no_sampling():
-    p = Params(pattern=optics.Pattern(True))
-    factors = [optics.striped(p.pattern, gap) for gap in APPROACH]
+def test_a_spot_alone_needs_no_sampling():
+    p = Params(spot=spot.Spot(True), pattern=spot.Pattern(0.5))
+    places = [gap + p.offset_distance for gap in APPROACH]
+    factors = [spot.brightness(p.spot, p.face, p.pattern, 1.1506, z_0) for z_0 in places]
     expected = light(APPROACH, p) * factors
     assert run(p, APPROACH, 1e-2) == pytest.approx(expected, rel=1e-13)
     assert run(p, [-0.1], 1e-2) == run(p, [0.0], 1e-2)
@@ -236,7 +238,8 @@ def test_the_seed_alone_decides_on_the_noise(stage):
 
 
 GROUPS = {
-    "": optics.Params, "pattern.": optics.Pattern, "ambient.": electronics.Ambient,
+    "": optics.Params, "spot.": spot.Spot, "face.": spot.Face, "pattern.": spot.Pattern,
+    "ambient.": electronics.Ambient,
     "noise.": noise.Noise, "adc.": electronics.Adc, "filter.": electronics.Filter,
     "sampling.": electronics.Sampling,
 }  # fmt: skip

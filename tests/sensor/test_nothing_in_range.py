@@ -6,11 +6,11 @@ from dataclasses import replace
 from math import inf
 
 import pytest
-from proximity_sensor import channel, electronics, optics
+from proximity_sensor import channel, electronics, optics, spot
 from proximity_sensor.channel import Inputs, Params
 
 NOTHING = [inf, sys.float_info.max, 1e9, 1.1 * optics.FARTHEST]
-STRIPED = Params(pattern=optics.Pattern(True, period=1e-6, edge=1e-9))
+PRINTED = Params(spot=spot.Spot(True), pattern=spot.Pattern(0.5, period=1e-6))
 STEEP = Params(diffusion_exponent=10.0, offset_distance=1e-6, gain=1e6)
 
 
@@ -21,7 +21,7 @@ def seen(p, gap):
 
 
 @pytest.mark.parametrize("gap", NOTHING)
-@pytest.mark.parametrize("p", [Params(), STRIPED, STEEP], ids=["plain", "striped", "steep"])
+@pytest.mark.parametrize("p", [Params(), PRINTED, STEEP], ids=["plain", "printed", "steep"])
 def test_the_intensity_of_nothing_is_zero(p, gap):
     assert seen(p, gap) == 0.0
 

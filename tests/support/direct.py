@@ -22,7 +22,10 @@ CONNECTIONS = [
 
 BENCH = {
     **GRASP["presets"]["bench"],
-    "sensor_1.pattern.enabled": True,
+    "sensor_1.spot.enabled": True,
+    "sensor_1.face.curvature": 10.0,
+    "sensor_1.face.tilt": 0.1,
+    "sensor_1.pattern.ratio": 0.57,
     "sensor_2.surface": 4,
     "plant.friction.coulomb[1]": 0.7,
     "plant.friction.viscous[2]": 3.0,
