@@ -23,9 +23,14 @@ class Params(series.Params):
     hold: holding.Params = holding.Params()
 
     @cached_property
-    def white(self) -> float:
-        """1/kappa of a white face, m.V^(1/n)."""
-        return reflectance_ratio.white(self.reflectance)
+    def sensors(self) -> reflectance_ratio.Sensors:
+        """Right and left."""
+        return reflectance_ratio.sensors(self.reflectance)
+
+    @cached_property
+    def mean_sensor(self) -> reflectance_ratio.Sensor:
+        """The one that stands for both."""
+        return reflectance_ratio.mean_sensor(self.sensors)
 
 
 class State(NamedTuple):
@@ -57,9 +62,12 @@ class Outputs(NamedTuple):
 def initial_state(p: Params, u: Inputs) -> State:
     """As the published law starts, with nothing learnt."""
     floor = p.impact_reduction.intensity_floor
-    line_1, line_2 = reflectance_ratio.first_points(p.reflectance, floor, u.position, u.intensity)
-    estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
-    return State(series.initial_state(p, u), line_1, line_2, estimate, 0.0, 0.0, 0.0)
+    line_1, line_2 = reflectance_ratio.first_points(p.sensors, floor, u.position, u.intensity)
+    estimate = reflectance_ratio.ratio(p.reflectance, p.sensors, line_1, line_2)
+    gaps = reflectance_ratio.gaps(p.reflectance, p.sensors, line_1, line_2)
+    seen = reflectance_ratio.by_one_sensor(p.sensors, p.mean_sensor, gaps, u.intensity)
+    layers = series.initial_state(p, u._replace(intensity=seen))
+    return State(layers, line_1, line_2, estimate, 0.0, 0.0, 0.0)
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
@@ -68,18 +76,21 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     closing = holding.filtered(p.hold, x.closing, v_1 - v_2, h)
     pressed = holding.pressed(p.hold, series.published_squeeze(p, x.layers, u), closing)
     lasting = holding.lasting(p.hold, x.lasting, pressed, h)
-    touching_1 = holding.touching(p.hold, p.reflectance, x.line_1, lasting)
-    touching_2 = holding.touching(p.hold, p.reflectance, x.line_2, lasting)
+    eye_1, eye_2 = p.sensors
+    touching_1 = holding.touching(p.hold, p.reflectance, eye_1, x.line_1, lasting)
+    touching_2 = holding.touching(p.hold, p.reflectance, eye_2, x.line_2, lasting)
     hold = pressed * (touching_1 * touching_2)  # (R9)
     floor = p.impact_reduction.intensity_floor
     free, lines = 1.0 - hold, (x.line_1, x.line_2)
     line_1, line_2 = reflectance_ratio.both_moved(
-        p.reflectance, lines, floor, u.position, u.intensity, free, h
+        p.reflectance, p.sensors, lines, floor, u.position, u.intensity, free, h
     )
-    estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
-    alike = reflectance_ratio.alike(estimate, u.intensity)
+    estimate = reflectance_ratio.ratio(p.reflectance, p.sensors, line_1, line_2)
+    gaps = reflectance_ratio.gaps(p.reflectance, p.sensors, line_1, line_2)
+    seen = reflectance_ratio.by_one_sensor(p.sensors, p.mean_sensor, gaps, u.intensity)
+    alike = reflectance_ratio.alike(estimate, seen)
     f_s = free * layer_3.virtual_force(p.simultaneous_contact, alike)  # Eq. (2')
-    layers = series.advance(p, x.layers, u, f_s, h)
+    layers = series.advance(p, x.layers, u._replace(intensity=seen), f_s, h)
     return State(layers, line_1, line_2, estimate, closing, lasting, hold)
 
 
@@ -95,6 +106,6 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
         y.impact_reduction_force,
         ratio,
         ratio * x.estimate.deviation,
-        reflectance_ratio.gaps(p.reflectance, p.white, x.line_1, x.line_2),
+        reflectance_ratio.gaps(p.reflectance, p.sensors, x.line_1, x.line_2),
         x.hold,
     )

@@ -21,31 +21,85 @@ from functools import cached_property
 from math import exp, inf, log, sqrt
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
-from block_variables import Output
+from block_variables import Output, Parameter
 
 from . import hand, holding, reflectance_ratio
+from .hand import ZEROS, PerFinger
 from .hand import Inputs as Inputs
-from .hand import PerFinger
 from .hand_size import FINGERS
-from .reflectance_ratio import Line
+from .reflectance_ratio import Line, Sensor
 
 if TYPE_CHECKING:
     Lines = tuple[Line, ...]
+    Sensors = tuple[Sensor, ...]
 else:
     Lines = tuple[(Line,) * FINGERS]
+    Sensors = tuple[(Sensor,) * FINGERS]
+
+
+@dataclass(frozen=True, slots=True)
+class Reflectance(reflectance_ratio.Learning, name="reflectance"):
+    """The sensors of all fingers, and what is learnt from them."""
+
+    diffusion_exponent: Annotated[
+        PerFinger, Parameter("n_k, diffusion exponent of the sensor", unit="1", low=0.1, high=10.0)
+    ] = (1.1506,) * FINGERS
+    offset_distance: Annotated[
+        PerFinger,
+        Parameter(
+            "l_0k, from the face of the sensor to its element",
+            unit="m",
+            low=0.0,
+            high=1.0,
+            tunable=True,
+        ),
+    ] = (5e-3,) * FINGERS
+    gain: Annotated[
+        PerFinger,
+        Parameter("K_k of a white face", unit="V.m^n", low=1e-9, high=1e6, tunable=True),
+    ] = (0.0024,) * FINGERS
 
 
 @dataclass(frozen=True)  # no slots: what is worked out from the parameters is kept
 class Params(hand.Params):
     """The weights and the three layers' parameters, and those of what is learnt."""
 
-    reflectance: reflectance_ratio.Params = reflectance_ratio.Params()
+    reflectance: Reflectance = Reflectance()
     hold: holding.Params = holding.Params()
 
     @cached_property
-    def white(self) -> float:
-        """1/kappa of a white face, m.V^(1/n)."""
-        return reflectance_ratio.white(self.reflectance)
+    def sensors(self) -> Sensors:
+        """Those of all fingers."""
+        learnt = self.reflectance
+        return tuple(
+            reflectance_ratio.sensor(n, l_0, gain)
+            for n, l_0, gain in zip(
+                learnt.diffusion_exponent, learnt.offset_distance, learnt.gain, strict=True
+            )
+        )
+
+    @cached_property
+    def mean_sensor(self) -> Sensor:
+        """The one that stands for all: mean n and l_0, and the geometric mean of K."""
+        n, l_0, log_gain = 0.0, 0.0, 0.0
+        for eye in self.sensors:
+            n, l_0, log_gain = n + eye.n, l_0 + eye.l_0, log_gain + eye.log_gain
+        fingers = float(FINGERS)
+        n, log_gain = n / fingers, log_gain / fingers
+        return Sensor(n, l_0 / fingers, log_gain, exp(log_gain / n))
+
+    @cached_property
+    def one_kind(self) -> bool:
+        """Whether all sensors are the same."""
+        first = self.sensors[0]
+        return all(reflectance_ratio.same(first, eye) for eye in self.sensors)
+
+
+class Brightness(NamedTuple):
+    """b_k if the faces differ, and how far that acts."""
+
+    full: PerFinger
+    share: float
 
 
 class State(NamedTuple):
@@ -53,7 +107,7 @@ class State(NamedTuple):
 
     layers: hand.State
     lines: Lines
-    brightness: PerFinger
+    brightness: Brightness
     closing: float
     lasting: float
     hold: float
@@ -79,7 +133,7 @@ class Outputs(NamedTuple):
     reflectance_ratio_standard_deviation: Annotated[
         PerFinger,
         Output(
-            "standard deviation of that ratio, by noise only",
+            "standard deviation of that ratio, by noise and calibration",
             unit="1",
             nominal=1.0,
             depends_on=set(),
@@ -102,10 +156,12 @@ def initial_state(p: Params, u: Inputs) -> State:
     """As the published law starts, with nothing learnt."""
     floor = p.impact_reduction.intensity_floor
     lines = tuple(
-        reflectance_ratio.first_point(p.reflectance, floor, s, xi)
-        for s, xi in zip(u.position, u.intensity, strict=True)
+        reflectance_ratio.first_point(eye, floor, s, xi)
+        for eye, s, xi in zip(p.sensors, u.position, u.intensity, strict=True)
     )
-    return State(hand.initial_state(p, u), lines, hand.ZEROS, 0.0, 0.0, 0.0)
+    seen = by_one_sensor(p, lines, u.intensity)
+    layers = hand.initial_state(p, u._replace(intensity=seen))
+    return State(layers, lines, Brightness(ZEROS, 1.0), 0.0, 0.0, 0.0)
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
@@ -120,27 +176,31 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     pressed = holding.pressed(p.hold, squeeze / fingers, closing)
     lasting = holding.lasting(p.hold, x.lasting, pressed, h)
     hold = pressed
-    for line in x.lines:
-        hold = hold * holding.touching(p.hold, p.reflectance, line, lasting)  # (R9)
+    for eye, line in zip(p.sensors, x.lines, strict=True):
+        hold = hold * holding.touching(p.hold, p.reflectance, eye, line, lasting)  # (R9)
     floor = p.impact_reduction.intensity_floor
     free, low_pass = 1.0 - hold, reflectance_ratio.low_pass(p.reflectance, h)
     lines = tuple(
-        reflectance_ratio.moved(p.reflectance, line, floor, s, xi, free, low_pass)
-        for line, s, xi in zip(x.lines, u.position, u.intensity, strict=True)
+        reflectance_ratio.moved(p.reflectance, eye, line, floor, s, xi, free, low_pass)
+        for eye, line, s, xi in zip(p.sensors, x.lines, u.position, u.intensity, strict=True)
     )
-    b = brightnesses(p.reflectance, lines)
-    f_s = hand.virtual_forces(p, alike(b, u.intensity))
+    brightness = brightnesses(p, lines)
+    b = tuple(brightness.share * full for full in brightness.full)
+    seen = by_one_sensor(p, lines, u.intensity)
+    f_s = hand.virtual_forces(p, alike(b, seen))
     # Eq. (2N')
-    layers = hand.advance(p, x.layers, u, tuple(free * f for f in f_s), h)
-    return State(layers, lines, b, closing, lasting, hold)
+    layers = hand.advance(p, x.layers, u._replace(intensity=seen), tuple(free * f for f in f_s), h)
+    return State(layers, lines, brightness, closing, lasting, hold)
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """The forces for the samples u, and what has been learnt."""
     y = hand.outputs(p, x.layers, u)
-    ratios = tuple(exp(b) for b in x.brightness)
+    share, full = x.brightness.share, x.brightness.full
+    ratios = tuple(exp(share * b) for b in full)
     deviations = tuple(
-        ratio * deviation(p.reflectance, line) for ratio, line in zip(ratios, x.lines, strict=True)
+        ratio * deviation(p.reflectance, line, b, share)
+        for ratio, line, b in zip(ratios, x.lines, full, strict=True)
     )
     return Outputs(
         y.force,
@@ -150,42 +210,85 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
         y.impact_reduction_force,
         ratios,
         deviations,
-        tuple(reflectance_ratio.gap(p.reflectance, line, p.white) for line in x.lines),
+        tuple(
+            reflectance_ratio.gap(p.reflectance, eye, line)
+            for eye, line in zip(p.sensors, x.lines, strict=True)
+        ),
         x.hold,
     )
 
 
-def brightnesses(p: reflectance_ratio.Params, lines: Lines) -> PerFinger:
-    """b_k, the logarithm of each face's reflectance to the mean, as far as the lines are certain.
+def brightnesses(p: Params, lines: Lines) -> Brightness:
+    """The reflectances of the faces to their mean, by the lines.
 
     All are zero before there is a slope.
     """
-    gains = tuple(gain(p, line) for line in lines)
-    # a_k = ln(K·alpha_k)
-    log_gains = tuple(p.diffusion_exponent * log(line.per_y) for line in lines)
+    gains = tuple(gain(p.reflectance, line) for line in lines)
+    # a_k = ln alpha_k, but for what all have in common
+    logs = tuple(
+        eye.n * log(line.per_y) - (eye.log_gain - p.mean_sensor.log_gain)
+        for eye, line in zip(p.sensors, lines, strict=True)
+    )
     total, weighted, low, high = 0.0, 0.0, inf, -inf
-    for g, a in zip(gains, log_gains, strict=True):
+    for g, a in zip(gains, logs, strict=True):
         total = total + g
         weighted = weighted + g * a
         low = min(low, a) if g > 0.0 else low
         high = max(high, a) if g > 0.0 else high
     if total <= 0.0:
-        return tuple(0.0 for _ in gains)
+        return Brightness(ZEROS, 1.0)
     mean = weighted / total
-    t = p.limit / (high - low) if high - low > p.limit else 1.0
+    limit = p.reflectance.limit
+    t = limit / (high - low) if high - low > limit else 1.0
+    share = reflectance_ratio.evidence(p.reflectance, t * t * squares(lines, logs))
     # (R7)
-    return tuple(t * g * (a - mean) for g, a in zip(gains, log_gains, strict=True))
+    return Brightness(tuple(t * g * (a - mean) for g, a in zip(gains, logs, strict=True)), share)
 
 
-def gain(p: reflectance_ratio.Params, line: Line) -> float:
+def squares(lines: Lines, logs: PerFinger) -> float:
+    """How far a_k are from one another, in variances: the squares of their deviations, summed."""
+    weight, weighted = 0.0, 0.0
+    first = logs[0]
+    for line, a in zip(lines, logs, strict=True):
+        w = 1.0 / max(line.variance, reflectance_ratio.TINY)
+        weight = weight + w
+        weighted = weighted + w * (a - first)
+    middle = weighted / weight if weight > 0.0 else 0.0
+    total = 0.0
+    for line, a in zip(lines, logs, strict=True):
+        off = a - first - middle
+        total = total + off * off / max(line.variance, reflectance_ratio.TINY)
+    return total
+
+
+def gain(p: Reflectance, line: Line) -> float:
     """g_k: how far a line is believed, from 0 without a slope to 1."""
     v = _prior(p)
     return v / (v + line.variance) if v > 0.0 else 0.0  # g_k of (R7)
 
 
-def deviation(p: reflectance_ratio.Params, line: Line) -> float:
-    """The standard deviation of b_k that is left, by noise only."""
-    return sqrt(_prior(p) * (1.0 - gain(p, line)))
+def deviation(p: Reflectance, line: Line, full: float, share: float) -> float:
+    """The standard deviation of ln alpha_k to the mean that is left, b_k being share·full."""
+    v = _prior(p)
+    left = v / (1.0 + v / line.brightness_variance)
+    missed = (1.0 - share) * full
+    return sqrt(left + missed * missed)
+
+
+def by_one_sensor(p: Params, lines: Lines, intensity: PerFinger) -> PerFinger:
+    """The intensities in V as the same sensor would give them on all fingers."""
+    if p.one_kind:
+        return intensity
+    return tuple(
+        translated(p, eye, line, xi)
+        for eye, line, xi in zip(p.sensors, lines, intensity, strict=True)
+    )
+
+
+def translated(p: Params, eye: Sensor, line: Line, xi: float) -> float:
+    """One of them."""
+    gap = reflectance_ratio.gap(p.reflectance, eye, line)
+    return reflectance_ratio.translated(eye, p.mean_sensor, gap) * xi
 
 
 def alike(b: PerFinger, intensity: PerFinger) -> PerFinger:
@@ -196,5 +299,5 @@ def alike(b: PerFinger, intensity: PerFinger) -> PerFinger:
     return tuple(exp(darkest - b_k) * xi for b_k, xi in zip(b, intensity, strict=True))
 
 
-def _prior(p: reflectance_ratio.Params) -> float:
+def _prior(p: Reflectance) -> float:
     return 0.5 * p.prior_deviation * p.prior_deviation

@@ -14,7 +14,7 @@ from typing import Annotated
 from block_variables import Group, Output, Parameter
 
 from . import reflectance_ratio
-from .reflectance_ratio import Line
+from .reflectance_ratio import Learning, Line, Sensor
 
 Hold = Annotated[
     float,
@@ -92,7 +92,7 @@ def pressed(p: Params, squeeze: float, closing: float) -> float:
     return square * slow / denominator  # (R6)
 
 
-def touching(p: Params, reflectance: reflectance_ratio.Params, line: Line, lasting: float) -> float:
+def touching(p: Params, learning: Learning, eye: Sensor, line: Line, lasting: float) -> float:
     """How far a finger may be at its face, from 0 to 1; `lasting` is p_f.
 
     Light and way both tell the gap, and the smaller one counts: the light errs where a sensor
@@ -100,8 +100,8 @@ def touching(p: Params, reflectance: reflectance_ratio.Params, line: Line, lasti
     """
     by_light = line.y * line.per_y
     by_way = line.mean_y * line.per_y + (line.s - line.mean_s)
-    gap = min(by_light, by_way) + line.ahead - reflectance.offset_distance
-    known = reflectance_ratio.known(reflectance, line)
+    gap = min(by_light, by_way) + line.ahead - eye.l_0
+    known = reflectance_ratio.known(learning, line)
     return known * near(p, gap) + (1.0 - known) * lasting  # a factor of (R9)
 
 

@@ -7,12 +7,15 @@ Derivation: controller/README.md
     (R1) y = kappa·(s - surface + l_0),   kappa = (K·alpha)^(-1/n)
     (R2) w = xi^q·travel                  weight of a point, by the travel that it stands for
     (R3) kappa = C_sy/C_ss                from weighted sums about the weighted means
-    (R4) beta = sigma_b^2/(sigma_b^2 + V_1 + V_2)·clip(n·ln(kappa_2/kappa_1), -beta_max, beta_max)
-    (R5) V = sigma^2·Q/C_sy^2,     Q = sum of (w·xi^(-1-1/n)·(s - mean of s))^2·(1 + 2·T_f/h)
+    (R4) beta = p·sigma_b^2/(sigma_b^2 + V)·f,   p = 1 - exp(-f^2/(2·gamma^2·V)),   V = V_1 + V_2,
+         f = clip(ln alpha_1 - ln alpha_2, -beta_max, beta_max),   ln alpha = -n·ln kappa - ln K
+    (R5) sigma^2·Q/C_sy^2,     Q = sum of (w·xi^(-1-1/n)·(s - mean of s))^2·(1 + 2·T_f/h)
+    (R10) what one sensor with the mean n, l_0 and K gives at the gaps that are learnt
+    (R11) V_j: (R5), and the squares of what errors of the calibration move
 """
 
 from dataclasses import dataclass
-from math import exp, inf, log, sqrt
+from math import exp, expm1, inf, log, sqrt
 from typing import Annotated, NamedTuple, TypeAlias
 
 from block_variables import Group, Output, Parameter
@@ -31,7 +34,7 @@ Ratio: TypeAlias = Annotated[
 RatioDeviation: TypeAlias = Annotated[
     float,
     Output(
-        "standard deviation of that ratio, by noise only",
+        "standard deviation of that ratio, by noise and calibration",
         unit="1",
         nominal=1.0,
         depends_on=set(),
@@ -51,16 +54,14 @@ EstimatedGap: TypeAlias = Annotated[
 
 
 @dataclass(frozen=True, slots=True)
-class Params(Group, name="reflectance"):
-    """The exponent of the sensors, the weights of the fits, and how far they are believed.
+class Learning(Group):
+    """The weights of the fits, and how far they are believed: the same for each finger.
 
     `intensity_noise` is measured at rest, behind the low-pass of T_f: white noise of sigma_0 in
-    samples h seconds apart leaves sigma_0/sqrt(1 + 2·T_f/h).
+    samples h seconds apart leaves sigma_0/sqrt(1 + 2·T_f/h). The deviations of the calibration are
+    those of a fit like the paper's, between sensors: an error that all share is of no effect.
     """
 
-    diffusion_exponent: Annotated[
-        float, Parameter("n, diffusion exponent of both sensors", unit="1", low=0.1, high=10.0)
-    ] = 1.1506
     time_constant: Annotated[
         float,
         Parameter(
@@ -81,6 +82,56 @@ class Params(Group, name="reflectance"):
             tunable=True,
         ),
     ] = 2.5e-4
+    exponent_deviation: Annotated[
+        float,
+        Parameter(
+            "sigma_n, standard deviation of the calibrated n",
+            unit="1",
+            low=0.0,
+            high=10.0,
+            tunable=True,
+        ),
+    ] = 0.01
+    offset_deviation: Annotated[
+        float,
+        Parameter(
+            "sigma_c, standard deviation of the offset voltage that is compensated",
+            unit="V",
+            low=0.0,
+            high=10.0,
+            tunable=True,
+        ),
+    ] = 1.8e-3
+    offset_distance_deviation: Annotated[
+        float,
+        Parameter(
+            "sigma_l, standard deviation of the calibrated l_0",
+            unit="m",
+            low=0.0,
+            high=1.0,
+            tunable=True,
+        ),
+    ] = 0.0
+    gain_deviation: Annotated[
+        float,
+        Parameter(
+            "sigma_K, standard deviation of ln K as calibrated",
+            unit="1",
+            low=0.0,
+            high=10.0,
+            tunable=True,
+        ),
+    ] = 0.05
+    caution: Annotated[
+        float,
+        Parameter(
+            "gamma, deviations below which a ratio hardly acts; 0: any acts",
+            unit="1",
+            low=0.0,
+            high=10.0,
+            tunable=True,
+        ),
+    ] = 0.5
     prior_deviation: Annotated[
         float,
         Parameter(
@@ -97,35 +148,64 @@ class Params(Group, name="reflectance"):
             "beta_max, most of ln(alpha_1/alpha_2)", unit="1", low=0.0, high=10.0, tunable=True
         ),
     ] = 2.5
-    gain: Annotated[
-        float,
-        Parameter(
-            "K of a white face, for the estimated gaps only",
-            unit="V.m^n",
-            low=1e-9,
-            high=1e6,
-            tunable=True,
-        ),
-    ] = 0.0024
+
+
+@dataclass(frozen=True, slots=True)
+class Params(Learning, name="reflectance"):
+    """The sensors of two fingers, and what is learnt from them."""
+
+    diffusion_exponent: Annotated[
+        Pair, Parameter("n_j, diffusion exponent of the sensor", unit="1", low=0.1, high=10.0)
+    ] = (1.1506, 1.1506)
     offset_distance: Annotated[
-        float,
+        Pair,
         Parameter(
-            "l_0, from the face of the sensor to its element, for the estimated gaps only",
+            "l_0j, from the face of the sensor to its element",
             unit="m",
             low=0.0,
             high=1.0,
             tunable=True,
         ),
-    ] = 5e-3
+    ] = (5e-3, 5e-3)
+    gain: Annotated[
+        Pair,
+        Parameter("K_j of a white face", unit="V.m^n", low=1e-9, high=1e6, tunable=True),
+    ] = (0.0024, 0.0024)
+
+
+class Sensor(NamedTuple):
+    """n, l_0 in m and ln K of a sensor, and 1/kappa of a white face in m.V^(1/n)."""
+
+    n: float
+    l_0: float
+    log_gain: float
+    white: float
+
+
+Sensors = tuple[Sensor, Sensor]
+"""A sensor per finger: right, left."""
+
+
+def sensor(n: float, l_0: float, gain: float) -> Sensor:
+    """The sensor of exponent n, offset l_0 in m and gain K in V.m^n."""
+    log_gain = log(gain)
+    return Sensor(n, l_0, log_gain, exp(log_gain / n))
+
+
+def sensors(p: Params) -> Sensors:
+    """Those of both fingers, right and left."""
+    (n_1, n_2), (l_1, l_2), (k_1, k_2) = p.diffusion_exponent, p.offset_distance, p.gain
+    return sensor(n_1, l_1, k_1), sensor(n_2, l_2, k_2)
 
 
 class Line(NamedTuple):
     """A finger's line y over s: the last point, weighted sums over all before, what they tell.
 
     `ahead` is the way in m of the finger before its low-passed place s. `q_0` to `q_2` are sums of
-    the noise of the points, by powers of their distance from the mean. `per_y` is 1/kappa in
-    m.V^(1/n), and `variance` that of n·ln kappa by the noise of the intensity; 1 and infinite
-    where there is no slope yet.
+    the noise of the points, by powers of their distance from the mean. `c_so` and `c_sn` are those
+    of how an error of the offset and of n moves y. `per_y` is 1/kappa in m.V^(1/n); 1 where there
+    is no slope yet. `variance` is that with which light tells whether the gaps are equal, and
+    `brightness_variance` that of ln alpha; infinite without a slope.
     """
 
     intensity: float
@@ -135,13 +215,18 @@ class Line(NamedTuple):
     weight: float
     mean_s: float
     mean_y: float
+    mean_o: float
+    mean_n: float
     c_ss: float
     c_sy: float
+    c_so: float
+    c_sn: float
     q_0: float
     q_1: float
     q_2: float
     per_y: float
     variance: float
+    brightness_variance: float
 
 
 Lines = tuple[Line, Line]
@@ -165,19 +250,27 @@ class Estimate(NamedTuple):
     dimmed: float
 
 
-def first_point(p: Params, floor: float, s: float, xi: float) -> Line:
+def first_point(eye: Sensor, floor: float, s: float, xi: float) -> Line:
     """The line of a finger at s in m that sees xi in V: a point, without a slope."""
     xi_f = max(xi, floor)
-    return _point(xi_f, s, exp(-log(xi_f) / p.diffusion_exponent), 0.0)
+    log_y = -log(xi_f) / eye.n
+    return _point(xi_f, s, exp(log_y), log_y, 0.0)
 
 
-def low_pass(p: Params, h: float) -> LowPass:
+def low_pass(p: Learning, h: float) -> LowPass:
     """The low-pass for a step of h seconds."""
     return LowPass(h / (p.time_constant + h), 1.0 + 2.0 * p.time_constant / h)
 
 
 def moved(
-    p: Params, line: Line, floor: float, s: float, xi: float, believed: float, low_pass: LowPass
+    p: Learning,
+    eye: Sensor,
+    line: Line,
+    floor: float,
+    s: float,
+    xi: float,
+    believed: float,
+    low_pass: LowPass,
 ) -> Line:
     """The line a step later, the finger at s in m that sees xi in V.
 
@@ -189,36 +282,55 @@ def moved(
     xi_f = max(line.intensity + share * (max(xi, floor) - line.intensity), floor)
     s_f = line.s + share * (s - line.s)
     log_xi = log(xi_f)
-    y = exp(-log_xi / p.diffusion_exponent)  # (R1)
+    log_y = -log_xi / eye.n
+    y = exp(log_y)  # (R1)
     weight = believed * exp(p.weight_exponent * log_xi) * _travel(line, s_f, y)  # (R2)
     total = line.weight + weight
     if total <= 0.0:
-        return _point(xi_f, s_f, y, s - s_f)
+        return _point(xi_f, s_f, y, log_y, s - s_f)
     # Means and sums about them, with one point more
+    o, n = y / xi_f, y * log_y
     new = weight / total
     shift = new * (s_f - line.mean_s)
     mean_s = line.mean_s + shift
     distance = s_f - mean_s
+    moment = weight * distance
+    from_y, from_o, from_n = y - line.mean_y, o - line.mean_o, n - line.mean_n
     c_ss = line.c_ss + weight * (s_f - line.mean_s) * distance
-    c_sy = line.c_sy + weight * (y - line.mean_y) * distance
-    mean_y = line.mean_y + new * (y - line.mean_y)
+    c_sy = line.c_sy + moment * from_y
+    c_so = line.c_so + moment * from_o
+    c_sn = line.c_sn + moment * from_n
     # Q of (R5), from moments about the mean that moves by `shift`
-    noise = weight * y / xi_f
+    noise = weight * o
     noise = noise * noise * low_pass.alike
     q_0 = line.q_0 + noise
     q_1 = line.q_1 - shift * line.q_0 + noise * distance
     q_2 = line.q_2 + shift * (shift * line.q_0 - 2.0 * line.q_1) + noise * distance * distance
-    per_y, variance = 1.0, inf
+    per_y, variance, brightness_variance = 1.0, inf, inf
     if 0.0 < c_ss < inf and 0.0 < c_sy < inf and 0.0 < q_2 < inf:
         per_y = c_ss / c_sy  # 1/kappa, (R3)
         relative = p.intensity_noise / c_sy
-        variance = relative * relative * q_2  # V, (R5)
-    sums = (total, mean_s, mean_y, c_ss, c_sy, q_0, q_1, q_2)
-    return Line(xi_f, s_f, y, s - s_f, *sums, per_y, variance)
+        # (R11)
+        by_offset = p.offset_deviation * c_so / c_sy
+        known = relative * relative * q_2 + by_offset * by_offset
+        bend = c_sn / c_sy
+        by_n = p.exponent_deviation * (bend - log_y)
+        by_l_0 = p.offset_distance_deviation * eye.n / (y * per_y)
+        variance = known + by_n * by_n + by_l_0 * by_l_0
+        by_n = p.exponent_deviation * (bend + log(per_y))
+        brightness_variance = known + by_n * by_n + p.gain_deviation * p.gain_deviation
+    means = (total, mean_s, line.mean_y + new * from_y)
+    more = (line.mean_o + new * from_o, line.mean_n + new * from_n)
+    sums = (c_ss, c_sy, c_so, c_sn, q_0, q_1, q_2)
+    last = (xi_f, s_f, y, s - s_f)
+    return Line(*last, *means, *more, *sums, per_y, variance, brightness_variance)
 
 
-def _point(xi_f: float, s_f: float, y: float, ahead: float) -> Line:
-    return Line(xi_f, s_f, y, ahead, 0.0, s_f, y, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, inf)
+def _point(xi_f: float, s_f: float, y: float, log_y: float, ahead: float) -> Line:
+    sums = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Line(
+        xi_f, s_f, y, ahead, 0.0, s_f, y, y / xi_f, y * log_y, *sums, 1.0, inf, inf
+    )  # fmt: skip
 
 
 def _travel(line: Line, s_f: float, y: float) -> float:
@@ -232,33 +344,68 @@ def _travel(line: Line, s_f: float, y: float) -> float:
     return _clamped(light_travel, 0.0, travel)
 
 
-def first_points(p: Params, floor: float, position: Pair, xi: Pair) -> Lines:
+def first_points(eyes: Sensors, floor: float, position: Pair, xi: Pair) -> Lines:
     """The lines of fingers on one axis, right and left, at places in m that see xi in V."""
-    (x_1, x_2), (xi_1, xi_2) = position, xi
-    return first_point(p, floor, x_1, xi_1), first_point(p, floor, -x_2, xi_2)
+    (eye_1, eye_2), (x_1, x_2), (xi_1, xi_2) = eyes, position, xi
+    return first_point(eye_1, floor, x_1, xi_1), first_point(eye_2, floor, -x_2, xi_2)
 
 
 def both_moved(
-    p: Params, lines: Lines, floor: float, position: Pair, xi: Pair, believed: float, h: float
+    p: Params,
+    eyes: Sensors,
+    lines: Lines,
+    floor: float,
+    position: Pair,
+    xi: Pair,
+    believed: float,
+    h: float,
 ) -> Lines:
     """Those lines h seconds later, see moved()."""
     (line_1, line_2), (x_1, x_2), (xi_1, xi_2) = lines, position, xi
+    eye_1, eye_2 = eyes
     filtered = low_pass(p, h)
     return (
-        moved(p, line_1, floor, x_1, xi_1, believed, filtered),
-        moved(p, line_2, floor, -x_2, xi_2, believed, filtered),
+        moved(p, eye_1, line_1, floor, x_1, xi_1, believed, filtered),
+        moved(p, eye_2, line_2, floor, -x_2, xi_2, believed, filtered),
     )
 
 
-def ratio(p: Params, line_1: Line, line_2: Line) -> Estimate:
+def ratio(p: Params, eyes: Sensors, line_1: Line, line_2: Line) -> Estimate:
     """The logarithm of the ratio, drawn towards 0 as far as the lines are uncertain."""
     prior = p.prior_deviation * p.prior_deviation
     if prior == 0.0:
         return Estimate(0.0, 0.0, 1.0)
-    gain = prior / (prior + (line_1.variance + line_2.variance))
-    fitted = p.diffusion_exponent * (log(line_1.per_y) - log(line_2.per_y))
-    beta = gain * _clamped(fitted, -p.limit, p.limit)  # (R4)
-    return Estimate(beta, p.prior_deviation * sqrt(1.0 - gain), exp(-abs(beta)))
+    eye_1, eye_2 = eyes
+    log_1, log_2 = log(line_1.per_y), log(line_2.per_y)
+    fitted = (
+        0.5 * (eye_1.n + eye_2.n) * (log_1 - log_2)
+        + 0.5 * (eye_1.n - eye_2.n) * (log_1 + log_2)
+        - (eye_1.log_gain - eye_2.log_gain)
+    )
+    within = _clamped(fitted, -p.limit, p.limit)
+    variance = max(line_1.variance + line_2.variance, TINY)
+    gain = prior / (prior + variance)
+    share = evidence(p, within * within / variance)
+    beta = share * gain * within  # (R4)
+    variance = line_1.brightness_variance + line_2.brightness_variance
+    gain = prior / (prior + variance)
+    missed = (1.0 - share) * gain * within
+    spread = prior * (1.0 - gain) + missed * missed
+    return Estimate(beta, sqrt(spread), exp(-abs(beta)))
+
+
+TINY = 1e-60
+"""Variance that is none."""
+
+
+def evidence(p: Learning, squares: float) -> float:
+    """How far a ratio acts that is sqrt(`squares`) deviations off 1, from 0 to 1.
+
+    With gamma = 1 it is one less the likelihood ratio of equal faces to those that were fitted.
+    """
+    if p.caution == 0.0:
+        return 1.0
+    return -expm1(-0.5 * squares / (p.caution * p.caution))
 
 
 def alike(estimate: Estimate, xi: Pair) -> Pair:
@@ -273,24 +420,49 @@ def learnt(estimate: Estimate) -> float:
     return 1.0 / estimate.dimmed if estimate.beta > 0.0 else estimate.dimmed
 
 
-def white(p: Params) -> float:
-    """1/kappa of a white face, m.V^(1/n)."""
-    return exp(log(p.gain) / p.diffusion_exponent)
+def mean_sensor(eyes: Sensors) -> Sensor:
+    """The sensor that stands for both: mean n and l_0, and the geometric mean of K."""
+    eye_1, eye_2 = eyes
+    n = 0.5 * (eye_1.n + eye_2.n)
+    log_gain = 0.5 * (eye_1.log_gain + eye_2.log_gain)
+    return Sensor(n, 0.5 * (eye_1.l_0 + eye_2.l_0), log_gain, exp(log_gain / n))
 
 
-def gaps(p: Params, white: float, line_1: Line, line_2: Line) -> Pair:
+def by_one_sensor(eyes: Sensors, mean: Sensor, gaps: Pair, xi: Pair) -> Pair:
+    """The intensities in V as the same sensor would give them on both sides, at gaps in m."""
+    (eye_1, eye_2), (gap_1, gap_2), (xi_1, xi_2) = eyes, gaps, xi
+    if same(eye_1, eye_2):
+        return xi
+    return translated(eye_1, mean, gap_1) * xi_1, translated(eye_2, mean, gap_2) * xi_2
+
+
+def same(eye: Sensor, other: Sensor) -> bool:
+    """Whether two sensors are the same."""
+    return eye.n == other.n and eye.l_0 == other.l_0 and eye.log_gain == other.log_gain
+
+
+def translated(eye: Sensor, mean: Sensor, gap: float) -> float:
+    """How much more a sensor `mean` gives than `eye` at a gap in m, whatever the face."""
+    gap = max(gap, 0.0)
+    d, common = max(gap + eye.l_0, TINY), max(gap + mean.l_0, TINY)
+    # (R10)
+    return exp(mean.log_gain - eye.log_gain + eye.n * log(d) - mean.n * log(common))
+
+
+def gaps(p: Params, eyes: Sensors, line_1: Line, line_2: Line) -> Pair:
     """The gaps in m that light and slopes tell; without a slope, that to a white face."""
-    return gap(p, line_1, white), gap(p, line_2, white)
+    eye_1, eye_2 = eyes
+    return gap(p, eye_1, line_1), gap(p, eye_2, line_2)
 
 
-def gap(p: Params, line: Line, white: float) -> float:
+def gap(p: Learning, eye: Sensor, line: Line) -> float:
     """The gap in m of a finger, 1/kappa drawn towards that of a white face as it is uncertain."""
     gain = known(p, line)
-    per_y = (1.0 - gain) * white + gain * line.per_y
-    return line.y * per_y - p.offset_distance + line.ahead  # (R1) for the gap
+    per_y = (1.0 - gain) * eye.white + gain * line.per_y
+    return line.y * per_y - eye.l_0 + line.ahead  # (R1) for the gap
 
 
-def known(p: Params, line: Line) -> float:
+def known(p: Learning, line: Line) -> float:
     """How far the slope of a line is known, from 0 without one to 1."""
     prior = p.prior_deviation * p.prior_deviation
     return prior / (prior + line.variance) if prior > 0.0 else 0.0

@@ -21,8 +21,9 @@ from . import contact_force as layer_1
 from . import grip, holding, impedance, reflectance_ratio, wrist_guidance
 from . import impact_reduction as layer_2
 from . import simultaneous_contact as published
+from .impact_reduction import Pair
 from .impedance import Motion
-from .reflectance_ratio import EstimatedGap, Line, Ratio, RatioDeviation
+from .reflectance_ratio import Estimate, EstimatedGap, Line, Ratio, RatioDeviation
 from .series import ImpactReductionForce, brake, gripped
 from .series import Inputs as Inputs
 from .wrist_guidance import Wrist
@@ -69,9 +70,14 @@ class Params:
     wrist: Wrist = Wrist()
 
     @cached_property
-    def white(self) -> float:
-        """1/kappa of a white face, m.V^(1/n)."""
-        return reflectance_ratio.white(self.reflectance)
+    def sensors(self) -> reflectance_ratio.Sensors:
+        """Right and left."""
+        return reflectance_ratio.sensors(self.reflectance)
+
+    @cached_property
+    def mean_sensor(self) -> reflectance_ratio.Sensor:
+        """The one that stands for both."""
+        return reflectance_ratio.mean_sensor(self.sensors)
 
 
 class State(NamedTuple):
@@ -83,12 +89,12 @@ class State(NamedTuple):
     virtual: Motion
     wrist_command: float
     target: float
-    fingertips: layer_2.Pair
-    intensity: layer_2.Pair
-    impact_reduction_force: layer_2.Pair
+    fingertips: Pair
+    intensity: Pair
+    impact_reduction_force: Pair
     line_1: Line
     line_2: Line
-    estimate: reflectance_ratio.Estimate
+    estimate: Estimate
     closing: float
     lasting: float
     hold: float
@@ -152,16 +158,18 @@ class Outputs(NamedTuple):
 def initial_state(p: Params, u: Inputs) -> State:
     """Virtual opening and wrist as measured and at rest, so that nothing jumps at the start."""
     floor = p.impact_reduction.intensity_floor
-    line_1, line_2 = reflectance_ratio.first_points(p.reflectance, floor, u.position, u.intensity)
-    estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
+    line_1, line_2 = reflectance_ratio.first_points(p.sensors, floor, u.position, u.intensity)
+    estimate = reflectance_ratio.ratio(p.reflectance, p.sensors, line_1, line_2)
     middle = _middle(u)
-    target = wrist_guidance.within(
-        middle + _offset_to_middle(p, u, line_1, line_2, _imbalance(estimate, u)), u.position
-    )
+    gaps = reflectance_ratio.gaps(p.reflectance, p.sensors, line_1, line_2)
+    seen = reflectance_ratio.by_one_sensor(p.sensors, p.mean_sensor, gaps, u.intensity)
+    rho = _imbalance(estimate, seen)
+    offset = _offset_to_middle(p, u, gaps, line_1, line_2, rho)
+    target = wrist_guidance.within(middle + offset, u.position)
     virtual = (_half_opening(u) if p.impact_reduction.enabled else 0.0), 0.0
     nothing = (0.0, 0.0)
     return State(
-        virtual, middle, target, u.position, u.intensity, nothing,
+        virtual, middle, target, u.position, seen, nothing,
         line_1, line_2, estimate, 0.0, 0.0, 0.0, grip.AT_REST, nothing,
     )  # fmt: skip
 
@@ -170,35 +178,46 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance virtual opening and wrist by h seconds (h > 0), the samples u held, and learn."""
     v_1, v_2 = u.velocity
     closing = holding.filtered(p.hold, x.closing, v_1 - v_2, h)
+    gaps = reflectance_ratio.gaps(p.reflectance, p.sensors, x.line_1, x.line_2)
+    seen = reflectance_ratio.by_one_sensor(p.sensors, p.mean_sensor, gaps, u.intensity)
     pressed = holding.pressed(p.hold, -0.5 * _published_force(p, x.virtual, u), closing)
     lasting = holding.lasting(p.hold, x.lasting, pressed, h)
-    touching_1 = holding.touching(p.hold, p.reflectance, x.line_1, lasting)
-    touching_2 = holding.touching(p.hold, p.reflectance, x.line_2, lasting)
+    eye_1, eye_2 = p.sensors
+    touching_1 = holding.touching(p.hold, p.reflectance, eye_1, x.line_1, lasting)
+    touching_2 = holding.touching(p.hold, p.reflectance, eye_2, x.line_2, lasting)
     held = pressed * (touching_1 * touching_2)  # (R9)
-    hold = wrist_guidance.agreed(held, _imbalance(x.estimate, u))
+    hold = wrist_guidance.agreed(held, _imbalance(x.estimate, seen))
     free = 1.0 - hold
     believed = free * wrist_guidance.steadiness(0.5 * (v_1 - v_2), 0.5 * (v_1 + v_2))
     floor, lines = p.impact_reduction.intensity_floor, (x.line_1, x.line_2)
     line_1, line_2 = reflectance_ratio.both_moved(
-        p.reflectance, lines, floor, u.position, u.intensity, believed, h
+        p.reflectance, p.sensors, lines, floor, u.position, u.intensity, believed, h
     )
-    estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
-    rho = _imbalance(estimate, u)
-    target = wrist_guidance.within(
-        _middle(u) + _offset_to_middle(p, u, line_1, line_2, rho), x.fingertips
-    )
+    estimate = reflectance_ratio.ratio(p.reflectance, p.sensors, line_1, line_2)
+    gaps = reflectance_ratio.gaps(p.reflectance, p.sensors, line_1, line_2)
+    seen = reflectance_ratio.by_one_sensor(p.sensors, p.mean_sensor, gaps, u.intensity)
+    rho = _imbalance(estimate, seen)
+    offset = _offset_to_middle(p, u, gaps, line_1, line_2, rho)
+    target = wrist_guidance.within(_middle(u) + offset, x.fingertips)
     wrist_command, pull = x.wrist_command, 1.0
     if p.simultaneous_contact.enabled:
         wrist_command = wrist_guidance.move(p.wrist, wrist_command, target, free, h)
         pull = max(SOFTEST, power(1.0 - rho * rho, p.simultaneous_contact.patience))
-    f_p = layer_2.virtual_forces(p.impact_reduction, u.intensity, x.intensity, h)
+    f_p = layer_2.virtual_forces(p.impact_reduction, seen, x.intensity, h)
     virtual = _closed(p, x.virtual, pull, f_p, h)
     squeeze = -0.5 * _published_force(p, x.virtual, u)
     gripping, light_rate = gripped(
-        p.contact_force, floor, squeeze, x.grip, x.light_rate, x.intensity, u, h
+        p.contact_force,
+        floor,
+        squeeze,
+        x.grip,
+        x.light_rate,
+        x.intensity,
+        u._replace(intensity=seen),
+        h,
     )
     return State(
-        virtual, wrist_command, target, x.fingertips, u.intensity, f_p,
+        virtual, wrist_command, target, x.fingertips, seen, f_p,
         line_1, line_2, estimate, closing, lasting, hold, gripping, light_rate,
     )  # fmt: skip
 
@@ -214,7 +233,7 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
         x.impact_reduction_force,
         ratio,
         ratio * x.estimate.deviation,
-        reflectance_ratio.gaps(p.reflectance, p.white, x.line_1, x.line_2),
+        reflectance_ratio.gaps(p.reflectance, p.sensors, x.line_1, x.line_2),
         x.hold,
     )
 
@@ -230,23 +249,28 @@ def _half_opening(u: Inputs) -> float:
     return 0.5 * (x_1 - x_2)
 
 
-def _imbalance(estimate: reflectance_ratio.Estimate, u: Inputs) -> float:
-    """rho: how much more light finger 1 has, as of faces that are alike, from -1 to 1."""
-    xi_1, xi_2 = reflectance_ratio.alike(estimate, u.intensity)
+def _imbalance(estimate: Estimate, seen: Pair) -> float:
+    """rho: how much more light finger 1 has, as of faces that are alike, from -1 to 1.
+
+    `seen` are the intensities in V, by one sensor.
+    """
+    xi_1, xi_2 = reflectance_ratio.alike(estimate, seen)
     return published.relative(published.lit(xi_1), published.lit(xi_2))
 
 
-def _offset_to_middle(p: Params, u: Inputs, line_1: Line, line_2: Line, rho: float) -> float:
+def _offset_to_middle(
+    p: Params, u: Inputs, gaps: Pair, line_1: Line, line_2: Line, rho: float
+) -> float:
     """S·d·tanh(rho)/n: from the wrist to the object's middle, m."""
-    gap_1, gap_2 = reflectance_ratio.gaps(p.reflectance, p.white, line_1, line_2)
+    gap_1, gap_2 = gaps
     between = min(0.5 * (gap_1 + gap_2), _half_opening(u))
-    d = between + p.reflectance.offset_distance
+    d = between + p.mean_sensor.l_0
     noise = p.reflectance.intensity_noise
     sight = wrist_guidance.sight(noise, line_1.intensity, line_2.intensity)
-    return sight * d * tanh(rho) / p.reflectance.diffusion_exponent  # T - X of (2T)
+    return sight * d * tanh(rho) / p.mean_sensor.n  # T - X of (2T)
 
 
-def _closed(p: Params, virtual: Motion, pull: float, f_p: layer_2.Pair, h: float) -> Motion:
+def _closed(p: Params, virtual: Motion, pull: float, f_p: Pair, h: float) -> Motion:
     """Half the virtual opening h seconds later, a share `pull` of K_a1 and f_p in N held.
 
     With layer 2 off it is closed.

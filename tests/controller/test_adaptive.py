@@ -71,13 +71,18 @@ def test_a_blind_sensor_teaches_nothing(alpha):
     assert [tuple(y)[:5] for _, y in trace] == [tuple(z) for z in published(p, dark, H)]
 
 
+def alike(value):
+    """The same for both fingers."""
+    return value, value
+
+
 ANY_LAWS = st.builds(
     Params,
     st.builds(layer_3.Params, st.booleans(), gain=st.floats(-5.0, 5.0)),
     st.builds(layer_2.Params, st.booleans()),
     reflectance=st.builds(
         reflectance_ratio.Params,
-        diffusion_exponent=st.floats(0.5, 2.0),
+        diffusion_exponent=st.floats(0.5, 2.0).map(alike),
         time_constant=st.floats(1e-6, 0.1),
         weight_exponent=st.floats(0.0, 10.0),
         intensity_noise=st.sampled_from([1e-12, 5e-4, 1.0]),
@@ -86,7 +91,12 @@ ANY_LAWS = st.builds(
     hold=st.builds(holding.Params, squeeze=st.floats(1e-6, 10.0), speed=st.floats(1e-4, 1.0)),
 )
 
-SURE = replace(Params(), reflectance=reflectance_ratio.Params(intensity_noise=1e-12))
+SURE = replace(
+    Params(),
+    reflectance=reflectance_ratio.Params(
+        intensity_noise=1e-12, exponent_deviation=0.0, offset_deviation=0.0
+    ),
+)
 """Of what it has learnt."""
 
 
@@ -138,9 +148,17 @@ STEPS = st.sampled_from([1e-300, 1e-9, 1e-4, 1e-3, 0.1, 1e3, 1e300]) | st.floats
 HARD_SAMPLES = st.lists(st.builds(Inputs, BOTH, BOTH, BOTH), min_size=2, max_size=8)
 
 
+def each(value, parameter):
+    """The value, for both fingers where there is one for either."""
+    return alike(value) if isinstance(parameter.default, tuple) else value
+
+
 def at_the_ends(block):
     """A part of the parameters, each at an end of its range or as by default."""
-    chosen = {p.name: st.sampled_from([p.low, p.default, p.high]) for p in parameters(block)}
+    chosen = {
+        p.name: st.sampled_from([each(p.low, p), p.default, each(p.high, p)])
+        for p in parameters(block)
+    }
     return st.builds(block, **chosen)
 
 
@@ -226,11 +244,14 @@ def test_a_sensor_that_saturates_unlearns_nothing(converter):
 
 PARTS = {"reflectance": reflectance_ratio.Params, "hold": holding.Params}
 
+SENSORS = ("diffusion_exponent", "offset_distance", "gain")
+"""Calibrations: n does not change, as y would be in another unit; l_0 and K tell other gaps."""
+
 OTHERS = [
     (part, p.name, value)
     for part, block in PARTS.items()
     for p in parameters(block)
-    if p.name != "diffusion_exponent"  # the one that does not change: y would be in another unit
+    if p.name not in SENSORS
     for value in (max(p.low, 0.3 * p.default), min(p.high, 3.0 * p.default), p.low, p.high)
 ]
 
@@ -312,18 +333,21 @@ def test_half_a_grasp_is_at_p_0_and_at_w_0(press, closing, pressed):
     assert holding.pressed(HOLD, press, closing) == pytest.approx(pressed, abs=1e-7)
 
 
+EYE, _ = Params().sensors
+
+
 def line_at(gap, known=True, **more):
     """A finger's line, by which it is at this gap in m by light and by way; 5 mm to the element."""
-    n = reflectance_ratio.Params().diffusion_exponent
+    n = EYE.n
     y = intensity(gap, 0.57) ** (-1.0 / n)
-    point = reflectance_ratio.first_point(reflectance_ratio.Params(), 1e-6, 0.05, y**-n)
+    point = reflectance_ratio.first_point(EYE, 1e-6, 0.05, y**-n)
     if not known:
         return point
     return point._replace(per_y=(gap + 5e-3) / y, variance=0.0, **more)
 
 
 def touching(line, lasting=0.3):
-    return holding.touching(HOLD, reflectance_ratio.Params(), line, lasting)
+    return holding.touching(HOLD, reflectance_ratio.Params(), EYE, line, lasting)
 
 
 @pytest.mark.parametrize(

@@ -30,6 +30,18 @@ TRUTH = log(0.6)
 NEVER_HOLDS = holding.Params(squeeze=1e12)
 
 
+NO_DEVIATION = {
+    "exponent_deviation": 0.0,
+    "offset_deviation": 0.0,
+    "offset_distance_deviation": 0.0,
+    "gain_deviation": 0.0,
+}
+"""A calibration without an error."""
+
+NOISE_ALONE = {**NO_DEVIATION, "caution": 0.0}
+"""All of the fitted ratio acts."""
+
+
 def law(q, noise, prior):
     """One that knows of the noise of a sample in V, and whose low-pass lets through all."""
     T_f = 1e-6
@@ -39,6 +51,7 @@ def law(q, noise, prior):
         intensity_noise=noise / sqrt(1.0 + 2.0 * T_f / H),
         prior_deviation=prior,
         limit=10.0,
+        **NOISE_ALONE,
     )
     return Params(reflectance=learnt, hold=NEVER_HOLDS)
 
@@ -89,7 +102,7 @@ def test_any_ratio_is_as_far_off_as_is_said(noise, gaps):
 @pytest.mark.parametrize("end", [5e-3, 0.04])
 def test_behind_the_low_pass_it_is_the_same(count, end):
     """With the numbers of the block: noise that is no longer white counts as if it were."""
-    p = replace(Params(), hold=NEVER_HOLDS)
+    p = Params(reflectance=reflectance_ratio.Params(**NOISE_ALONE), hold=NEVER_HOLDS)
     noise = p.reflectance.intensity_noise * sqrt(1.0 + 2.0 * p.reflectance.time_constant / H)
     random, trials = Random(3), 60
     found = [learnt_in_noise(p, noise, ALPHA, (0.08, end), count, random) for _ in range(trials)]
@@ -98,7 +111,9 @@ def test_behind_the_low_pass_it_is_the_same(count, end):
 
 
 SURE = Params(
-    reflectance=reflectance_ratio.Params(time_constant=1e-6, intensity_noise=1e-12, limit=10.0),
+    reflectance=reflectance_ratio.Params(
+        time_constant=1e-6, intensity_noise=1e-12, limit=10.0, **NOISE_ALONE
+    ),
     hold=holding.Params(squeeze=1e12),
 )
 """No noise is reckoned with, no lag, and nothing but the light."""
@@ -179,7 +194,7 @@ def test_neither_the_gain_nor_the_offset_is_used(alpha, l_0, gaps):
         for u in approach(alpha, gaps)
     ]
     assert learnt(samples) == pytest.approx(log(alpha[0] / alpha[1]), abs=1e-6)
-    other = replace(SURE.reflectance, gain=1.0, offset_distance=0.5)
+    other = replace(SURE.reflectance, gain=(1.0, 1.0), offset_distance=(0.5, 0.5))
     assert run(replace(SURE, reflectance=other), samples)[-1][0].estimate.beta == learnt(samples)
 
 
@@ -197,3 +212,96 @@ def test_a_retreat_teaches_as_much_as_an_approach():
     samples = approach(ALPHA)
     there, back = (run(Params(), way)[-1][0].estimate for way in (samples, samples[::-1]))
     assert back == pytest.approx(there, rel=0.2)
+
+
+def sensors_of(n, l_0, gain):
+    """SURE, its sensors calibrated."""
+    known = replace(SURE.reflectance, diffusion_exponent=n, offset_distance=l_0, gain=gain)
+    return replace(SURE, reflectance=known)
+
+
+def seen_by(samples, alpha, n, l_0, gain, offset=(0.0, 0.0)):
+    """The same approach by Eq. (9) of each sensor."""
+    seen = []
+    for u in samples:
+        x_1, x_2 = u.position
+        gaps = (x_1 - 0.035, -x_2 - 0.035)
+        xi_1, xi_2 = (alpha[j] * gain[j] / (gaps[j] + l_0[j]) ** n[j] + offset[j] for j in range(2))
+        seen.append(u._replace(intensity=(xi_1, xi_2)))
+    return seen
+
+
+UNLIKE = {"n": (1.1, 1.2), "l_0": (5.5e-3, 4.5e-3), "gain": (3e-3, 2e-3)}
+
+
+@pytest.mark.parametrize("alpha", [(1.0, 1.0), (0.5, 1.0), (1.2, 0.3)])
+def test_sensors_that_differ_are_compared_by_the_gaps(alpha):
+    """At gaps l the force is that of sensors with the mean n and l_0, (l + l_0)^-n."""
+    p = sensors_of(**UNLIKE)
+    for start, ends in (((0.06, 0.08), (0.02, 0.02)), ((0.06, 0.08), (0.01, 0.025))):
+        way = [
+            Inputs((0.035 + l_1, -0.035 - l_2), (0.0, 0.0), (0.1, 0.1))
+            for k in range(101)
+            for l_1, l_2 in [tuple(a + (b - a) * k / 100 for a, b in zip(start, ends, strict=True))]
+        ]
+        x, y = run(p, seen_by(way, alpha, **UNLIKE))[-1]
+        assert x.estimate.beta == pytest.approx(log(alpha[0] / alpha[1]), abs=1e-6)
+        assert y.estimated_gap == pytest.approx(ends, abs=1e-6)
+        d_1, d_2 = (gap + 5e-3 for gap in ends)
+        alike = (d_1 / d_2) ** 1.15
+        expected = 3.0 * tanh((1.0 - alike) / (1.0 + alike))
+        assert y.simultaneous_contact_force == pytest.approx(expected, abs=1e-6)
+
+
+def test_before_anything_is_learnt_faces_count_as_white():
+    u = seen_by(approach((1.0, 1.0), (0.03, 0.03)), (1.0, 1.0), **UNLIKE)[0]
+    y = run(sensors_of(**UNLIKE), [u, u])[-1][1]
+    assert y.estimated_gap == pytest.approx((0.03, 0.03), abs=1e-9)
+    assert y.simultaneous_contact_force == pytest.approx(0.0, abs=1e-9)
+
+
+def line_of(samples, **known):
+    """What a calibration with deviations tells of the right finger."""
+    learnt = replace(SURE.reflectance, **known)
+    return run(replace(SURE, reflectance=learnt), samples)[-1][0].line_1
+
+
+@pytest.mark.parametrize("alpha", [0.3, 1.0])
+@pytest.mark.parametrize("end", [0.0, 0.01, 0.04])
+def test_the_variance_by_calibration_is_that_of_small_errors(alpha, end):
+    """By the slopes that sensors with small errors teach, and by their light at the last gap."""
+    small, way, faces = 1e-5, approach((1.0, 1.0), end=end), (alpha, 1.0)
+    one = {"n": (N, N), "l_0": (L_0, L_0), "gain": (0.0024, 0.0024)}
+    beta = learnt(true := seen_by(way, faces, **one))
+    by_c = (learnt(seen_by(way, faces, **one, offset=(small, 0.0))) - beta) / small
+    told = line_of(true, offset_deviation=1.0)
+    assert told.variance == pytest.approx(by_c**2, rel=2e-2)
+    assert told.brightness_variance == pytest.approx(by_c**2, rel=2e-2)
+    other = seen_by(way, faces, **{**one, "n": (N + small, N)})
+    by_n = (learnt(other) - beta) / small
+    told = line_of(true, exponent_deviation=1.0)
+    assert told.brightness_variance == pytest.approx(by_n**2, rel=2e-2)
+    seen = log(other[-1].intensity[0] / true[-1].intensity[0]) / small
+    assert told.variance == pytest.approx((by_n - seen) ** 2, rel=2e-2)
+    moved = seen_by(way, faces, **{**one, "l_0": (L_0 + small, L_0)})
+    assert learnt(moved) == pytest.approx(beta, abs=1e-8)
+    seen = log(moved[-1].intensity[0] / true[-1].intensity[0]) / small
+    told = line_of(true, offset_distance_deviation=1.0)
+    assert told.variance == pytest.approx(seen**2, rel=2e-2)
+    assert line_of(true, gain_deviation=0.1).brightness_variance == pytest.approx(0.01, rel=1e-3)
+
+
+@pytest.mark.parametrize("gamma", [0.5, 1.0])
+def test_a_ratio_acts_by_the_likelihood_of_equal_faces(gamma):
+    """1 - (L(0)/L(f))^(1/gamma^2), L being normal about the fitted f."""
+    samples = approach((0.9, 1.0))
+    one = run(replace(SURE, reflectance=replace(SURE.reflectance, offset_deviation=1.0)), samples)
+    V = one[-1][0].line_1.variance + one[-1][0].line_2.variance
+    known = {"offset_deviation": 0.1 / (gamma * sqrt(V)), "prior_deviation": 10.0}
+    f = run(replace(SURE, reflectance=replace(SURE.reflectance, **known)), samples)[-1][0]
+    cautious = replace(SURE.reflectance, caution=gamma, **known)
+    x = run(replace(SURE, reflectance=cautious), samples)[-1][0]
+    V = x.line_1.variance + x.line_2.variance
+    acts = 1.0 - exp(-(f.estimate.beta**2) / (2.0 * V)) ** (1.0 / gamma**2)
+    assert 0.05 < acts < 0.95
+    assert x.estimate.beta == pytest.approx(acts * f.estimate.beta, rel=1e-3)

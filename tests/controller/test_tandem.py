@@ -16,7 +16,11 @@ from scipy.integrate import solve_ivp
 from support.approach import ANY_SAMPLES, H, N, approach, intensity, mirrored, numbers, pairs
 from support.marks import examples
 
-SURE = Params(reflectance=reflectance_ratio.Params(intensity_noise=1e-12))
+SURE = Params(
+    reflectance=reflectance_ratio.Params(
+        intensity_noise=1e-12, exponent_deviation=0.0, offset_deviation=0.0
+    )
+)
 """Of what it has learnt."""
 
 UNLEARNT = Params(reflectance=reflectance_ratio.Params(prior_deviation=0.0))
@@ -48,7 +52,10 @@ def seen_off(off, gap, n=N):
 def test_the_target_is_the_middle_to_first_order(gap, share, n):
     """By Eq. (9) d·tanh(rho)/n = e·(1 - c·(e/d)^2) with |c| < 1 + n^2: second order is none."""
     learning = reflectance_ratio.Params(
-        diffusion_exponent=n, gain=0.0024 * 0.1 ** (n - N), prior_deviation=0.0
+        diffusion_exponent=(n, n),
+        gain=(0.0024 * 0.1 ** (n - N),) * 2,
+        prior_deviation=0.0,
+        intensity_noise=1e-12,
     )
     off = share * gap
     u = seen_off(off, gap, n)
@@ -300,7 +307,7 @@ LAWS = st.builds(
     st.builds(layer_2.Params, st.booleans()),
     reflectance=st.builds(
         reflectance_ratio.Params,
-        diffusion_exponent=st.floats(0.5, 2.0),
+        diffusion_exponent=st.floats(0.5, 2.0).map(lambda n: (n, n)),
         time_constant=st.floats(1e-6, 0.1),
         prior_deviation=st.floats(0.0, 3.0),
     ),

@@ -111,9 +111,12 @@ def test_the_defaults_of_the_blocks_are_the_numbers_of_the_reference():
     defaults = [rigid.Params(), channel.Params(), channel.Params(), series.Params()]
     assert [*blocks(Grasp()).values()] == defaults
     p, h = reflectance_ratio.Params(), holding.Params()
-    learnt = (p.diffusion_exponent, p.time_constant, p.weight_exponent, p.intensity_noise)
-    held = (h.squeeze, h.speed, h.time_constant, h.gap, h.blind_time, p.offset_distance)
-    assert Adaptive() == Adaptive(*learnt, p.prior_deviation, p.limit, *held)
+    n, _ = p.diffusion_exponent
+    learnt = (n, p.time_constant, p.weight_exponent, p.intensity_noise)
+    known = (p.exponent_deviation, p.offset_deviation, p.gain_deviation, p.caution)
+    l_0, _ = p.offset_distance
+    held = (h.squeeze, h.speed, h.time_constant, h.gap, h.blind_time, l_0)
+    assert Adaptive() == Adaptive(*learnt, p.prior_deviation, p.limit, *known, *held)
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,10 @@ class Adaptive:
     sigma: float = 2.5e-4
     sigma_b: float = 1.0
     beta_max: float = 2.5
+    sigma_n: float = 0.01
+    sigma_c: float = 1.8e-3
+    sigma_K: float = 0.05
+    gamma: float = 0.5
     P_0: float = 0.1
     w_0: float = 5e-4
     T_w: float = 0.02
@@ -42,8 +46,8 @@ class Adaptive:
 
 
 class Line(NamedTuple):
-    """Intensity and way behind their low-passes, the sums of weight, s, y, s^2 and s·y, and those
-    of the noise by powers of s.
+    """Intensity and way behind their low-passes, the sums of weight, s, y, s^2 and s·y, those of
+    y/xi and y·ln y and of their products with s, and those of the noise by powers of s.
     """
 
     xi: float
@@ -53,6 +57,10 @@ class Line(NamedTuple):
     sum_y: float
     sum_ss: float
     sum_sy: float
+    sum_o: float
+    sum_so: float
+    sum_n: float
+    sum_sn: float
     noise: float
     noise_s: float
     noise_ss: float
@@ -96,7 +104,7 @@ class Learning:
         kappa = _fit(line)
         if kappa is None:
             return lasting
-        known = self.p.sigma_b**2 / (self.p.sigma_b**2 + self._variance(line, kappa, xi_0))
+        known = self.p.sigma_b**2 / (self.p.sigma_b**2 + self._variances(line, kappa, xi_0)[0])
         zero = (line.sum_s - line.sum_y / kappa) / line.weight  # way at which the line has y = 0
         by_way = way - MILLIMETRE * zero
         by_light = way + MILLIMETRE * (line.xi ** (-1.0 / self.p.n) / kappa - line.s)
@@ -113,9 +121,17 @@ class Learning:
         xi_1, xi_2 = self.xi_0
         fitted = log(xi_1 / xi_2) - self.p.n * log(kappa_1 / kappa_2)
         prior, most = self.p.sigma_b**2, self.p.beta_max
-        variance = self._variance(line_1, kappa_1, xi_1) + self._variance(line_2, kappa_2, xi_2)
-        gain = prior / (prior + variance)
-        return gain * min(max(fitted, -most), most), self.p.sigma_b * sqrt(1.0 - gain)
+        (gaps_1, faces_1), (gaps_2, faces_2) = (
+            self._variances(line, kappa, xi_0)
+            for line, kappa, xi_0 in ((line_1, kappa_1, xi_1), (line_2, kappa_2, xi_2))
+        )
+        fitted = min(max(fitted, -most), most)
+        variance = gaps_1 + gaps_2
+        acts = 1.0 - exp(-(fitted**2) / (2.0 * self.p.gamma**2 * variance))
+        gain = prior / (prior + faces_1 + faces_2)
+        missed = (1.0 - acts) * gain * fitted
+        deviation = sqrt(prior * (1.0 - gain) + missed**2)
+        return acts * prior / (prior + variance) * fitted, deviation
 
     def rates(self, z, s, xi, closing, u):
         """The derivative of the state, at ways s in m, intensities xi in V and forces u in N."""
@@ -138,15 +154,28 @@ class Learning:
         w = believed * line.xi**self.p.q * travel
         at = line.s
         noise = (w * y / line.xi) ** 2
-        sums = [w, w * at, w * y, w * at * at, w * at * y]
+        o, ln = y / line.xi, y * log(y)
+        sums = [w, w * at, w * y, w * at * at, w * at * y, w * o, w * at * o, w * ln, w * at * ln]
         return [xi_rate, s_rate, *sums, noise, noise * at, noise * at * at]
 
-    def _variance(self, line, kappa, xi_0):
-        """V_j: white noise of the density 2·T_f·sigma^2 in what the slope is made of."""
+    def _variances(self, line, kappa, xi_0):
+        """V_j and that of ln alpha_j.
+
+        White noise has the density 2·T_f·sigma^2 in what the slope is made of. The errors of the
+        calibration change the slope of y, and that of n also the line that y is compared with.
+        """
         mean = line.sum_s / line.weight
         q = line.noise_ss - 2.0 * mean * line.noise_s + mean**2 * line.noise
         relative = self.p.sigma / (xi_0 * kappa * _spread(line))
-        return 2.0 * self.p.T_f * relative**2 * q
+        by_noise = 2.0 * self.p.T_f * relative**2 * q
+        c_sy = kappa * _spread(line)
+        by_c = self.p.sigma_c / xi_0 * (line.sum_so - mean * line.sum_o) / c_sy
+        bend = (line.sum_sn - mean * line.sum_n) / c_sy
+        here = bend + log(line.xi) / self.p.n
+        anywhere = bend - log(kappa) + log(MILLIMETRE)
+        both = by_noise + by_c**2
+        gaps = both + (self.p.sigma_n * here) ** 2
+        return gaps, both + (self.p.sigma_n * anywhere) ** 2 + self.p.sigma_K**2
 
 
 def _lines(z):

@@ -71,7 +71,7 @@ def _signal(v: Variable, number: int, t: float) -> float | bool:
     It is never further from the start than the nominal value, and stays on the side of zero on
     which it starts; neighbours begin in opposite directions. A boolean one changes at the jump.
     """
-    frequency, jump = 0.5 + 0.125 * number, 1.5 + 0.125 * number
+    frequency, jump = 0.25 + 0.125 * number, 1.5 + 0.125 * number
     if v.kind is bool:
         return bool(v.start) != (t >= jump)
     start, nominal = float(v.start or 0.0), v.nominal or 1.0

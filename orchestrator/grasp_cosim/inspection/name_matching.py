@@ -29,7 +29,7 @@ _SYNONYMS = {
     "position": "pos x displacement location coordinate",
     "velocity": "vel speed v xd xdot dx vx",
     "force": "frc f effort thrust load",
-    "contact": "touch touching touches touched contacting collision normal reaction c",
+    "contact": "touch touching touches contacting collision normal reaction c",
     "object": "obj workpiece part item",
     "width": "w thickness",
     "initial": "init start x0",

@@ -171,7 +171,7 @@ def test_what_is_refused_changes_nothing_and_is_told_by_a_code(written, tmp_path
     done = subprocess.run([tmp_path / "refuses"], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout
     *steps, parameter = done.stdout.splitlines()
-    assert parameter == "1 27 contact_force.stiffness = -1.0 N/m: must be from 0 to 1e+06 N/m"
+    assert parameter == "1 28 contact_force.stiffness = -1.0 N/m: must be from 0 to 1e+06 N/m"
     none = [line.split(" ", 3) for line in steps if line[0] in "34"]
     assert [(int(i), int(variable)) for _, i, variable, _ in none] == [(i, i) for i in range(6)] * 2
     assert none[0][3] == "position[1] = nan m: must be a finite number"

@@ -225,6 +225,7 @@ def _claims_on_experiments(e: Evidence) -> Iterator[Claim]:
     soft = max(max(run.touch_forces) for run in e.runs.values() if run.case > 0)
     hard = min(min(run.touch_forces) for run in e.runs.values() if run.case == 0)
     yield Claim(
+        "With alpha = 200 1/s of the contact, "
         f"Case 0 has an impact, Cases 1 and 2 have none: within {1e3 * IMPACT_WINDOW:.0f} ms of "
         f"touching every contact force rises above the settled {settled:.2f} N in Case 0 (to "
         f"{hard:.1f} N or more) and none does in Cases 1 and 2 (to {soft:.1f} N or less).",
