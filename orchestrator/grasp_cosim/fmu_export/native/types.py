@@ -10,7 +10,7 @@ from pathlib import Path
 from types import GenericAlias
 from typing import Annotated, Any, NamedTuple, cast, get_args, get_origin, get_type_hints
 
-from .text import Source, comment, identifier, number, wrapped
+from .text import WIDTH, Source, comment, identifier, number, wrapped
 
 Type = type[Any] | GenericAlias
 """The types of Python: float, int, bool, tuple[...], a NamedTuple, or a dataclass of parameters.
@@ -178,8 +178,7 @@ class Program:
         lines.append("typedef struct {")
         for name, kind, meaning in self._members(t):
             self._define(kind, done)
-            meaning_comment = f" {comment(meaning)}" if meaning else ""
-            lines.append(f"    {self.c(kind)} {name};{meaning_comment}")
+            lines += _member_lines(f"{self.c(kind)} {name};", meaning)
         done[t] = "\n".join([*lines, f"}} {self.c(t)};", ""])
 
     def _members(self, t: Type) -> Iterator[tuple[str, Type, str]]:
@@ -222,3 +221,11 @@ class Program:
 def alike(t: Type) -> bool:
     """Return True for a tuple whose items have one type in C: they are an array."""
     return isinstance(t, GenericAlias) and len({plain(item) for item in t.__args__}) == 1
+
+
+def _member_lines(declaration: str, meaning: str) -> list[str]:
+    """A member of a struct with its meaning behind it, or above it where that is too long."""
+    if not meaning:
+        return [f"    {declaration}"]
+    line = f"    {declaration} {comment(meaning)}"
+    return [line] if len(line) <= WIDTH else [f"    {comment(meaning)}", f"    {declaration}"]
