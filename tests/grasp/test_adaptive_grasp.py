@@ -260,10 +260,9 @@ def drawn_calibrations(runs):
 
 @pytest.mark.slow
 @pytest.mark.campaign
-def test_two_standard_deviations_contain_the_ratio(grasp):
+def test_two_standard_deviations_contain_the_ratio(natives):
     """In 95 % of grasps; with so many, between the 0.1 and the 99.9 % of a binomial."""
-    inside, runs = 0, marks.part(1000)
-    system = with_controller(grasp, "adaptive")
+    inside, runs, system = 0, marks.part(1000), adaptive_grasp(natives)
     for truth, values in drawn_calibrations(runs):
         result = run(system, values, 2e-3, 4.0)
         name = "controller.reflectance_ratio"
@@ -307,9 +306,9 @@ def values_in_domain(point):
 
 @pytest.mark.slow
 @pytest.mark.campaign
-def test_no_search_finds_the_adaptive_law_far_behind_the_published_one(grasp):
+def test_no_search_finds_the_adaptive_law_far_behind_the_published_one(natives):
     """Differential evolution; a whole campaign is 20,000 grasps, and `make explore` a twentieth."""
-    laws = [with_controller(grasp, law) for law in ("published", "adaptive")]
+    laws = System.load(SYSTEM, natives), adaptive_grasp(natives)
     population = 50
 
     def gained(point):
