@@ -64,9 +64,10 @@ def initial_state(p: Params, u: Inputs) -> State:
     floor = p.impact_reduction.intensity_floor
     line_1, line_2 = reflectance_ratio.first_points(p.sensors, floor, u.position, u.intensity)
     estimate = reflectance_ratio.ratio(p.reflectance, p.sensors, line_1, line_2)
-    gaps = reflectance_ratio.gaps(p.reflectance, p.sensors, line_1, line_2)
-    seen = reflectance_ratio.by_one_sensor(p.sensors, p.mean_sensor, gaps, u.intensity)
-    layers = series.initial_state(p, u._replace(intensity=seen))
+    seen = reflectance_ratio.by_one_sensor(
+        p.reflectance, p.sensors, p.mean_sensor, line_1, line_2, u.intensity
+    )
+    layers = series.initial_state(p, Inputs(u.position, u.velocity, seen))
     return State(layers, line_1, line_2, estimate, 0.0, 0.0, 0.0)
 
 
@@ -86,11 +87,12 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
         p.reflectance, p.sensors, lines, floor, u.position, u.intensity, free, h
     )
     estimate = reflectance_ratio.ratio(p.reflectance, p.sensors, line_1, line_2)
-    gaps = reflectance_ratio.gaps(p.reflectance, p.sensors, line_1, line_2)
-    seen = reflectance_ratio.by_one_sensor(p.sensors, p.mean_sensor, gaps, u.intensity)
+    seen = reflectance_ratio.by_one_sensor(
+        p.reflectance, p.sensors, p.mean_sensor, line_1, line_2, u.intensity
+    )
     alike = reflectance_ratio.alike(estimate, seen)
     f_s = free * layer_3.virtual_force(p.simultaneous_contact, alike)  # Eq. (2')
-    layers = series.advance(p, x.layers, u._replace(intensity=seen), f_s, h)
+    layers = series.advance(p, x.layers, Inputs(u.position, u.velocity, seen), f_s, h)
     return State(layers, line_1, line_2, estimate, closing, lasting, hold)
 
 

@@ -428,11 +428,14 @@ def mean_sensor(eyes: Sensors) -> Sensor:
     return Sensor(n, 0.5 * (eye_1.l_0 + eye_2.l_0), log_gain, exp(log_gain / n))
 
 
-def by_one_sensor(eyes: Sensors, mean: Sensor, gaps: Pair, xi: Pair) -> Pair:
-    """The intensities in V as the same sensor would give them on both sides, at gaps in m."""
-    (eye_1, eye_2), (gap_1, gap_2), (xi_1, xi_2) = eyes, gaps, xi
+def by_one_sensor(
+    p: Params, eyes: Sensors, mean: Sensor, line_1: Line, line_2: Line, xi: Pair
+) -> Pair:
+    """The intensities in V as the same sensor would give them on both sides, at the learnt gaps."""
+    eye_1, eye_2 = eyes
     if same(eye_1, eye_2):
         return xi
+    (gap_1, gap_2), (xi_1, xi_2) = gaps(p, eyes, line_1, line_2), xi
     return translated(eye_1, mean, gap_1) * xi_1, translated(eye_2, mean, gap_2) * xi_2
 
 

@@ -162,7 +162,9 @@ def initial_state(p: Params, u: Inputs) -> State:
     estimate = reflectance_ratio.ratio(p.reflectance, p.sensors, line_1, line_2)
     middle = _middle(u)
     gaps = reflectance_ratio.gaps(p.reflectance, p.sensors, line_1, line_2)
-    seen = reflectance_ratio.by_one_sensor(p.sensors, p.mean_sensor, gaps, u.intensity)
+    seen = reflectance_ratio.by_one_sensor(
+        p.reflectance, p.sensors, p.mean_sensor, line_1, line_2, u.intensity
+    )
     rho = _imbalance(estimate, seen)
     offset = _offset_to_middle(p, u, gaps, line_1, line_2, rho)
     target = wrist_guidance.within(middle + offset, u.position)
@@ -178,8 +180,9 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance virtual opening and wrist by h seconds (h > 0), the samples u held, and learn."""
     v_1, v_2 = u.velocity
     closing = holding.filtered(p.hold, x.closing, v_1 - v_2, h)
-    gaps = reflectance_ratio.gaps(p.reflectance, p.sensors, x.line_1, x.line_2)
-    seen = reflectance_ratio.by_one_sensor(p.sensors, p.mean_sensor, gaps, u.intensity)
+    seen = reflectance_ratio.by_one_sensor(
+        p.reflectance, p.sensors, p.mean_sensor, x.line_1, x.line_2, u.intensity
+    )
     pressed = holding.pressed(p.hold, -0.5 * _published_force(p, x.virtual, u), closing)
     lasting = holding.lasting(p.hold, x.lasting, pressed, h)
     eye_1, eye_2 = p.sensors
@@ -195,7 +198,9 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     )
     estimate = reflectance_ratio.ratio(p.reflectance, p.sensors, line_1, line_2)
     gaps = reflectance_ratio.gaps(p.reflectance, p.sensors, line_1, line_2)
-    seen = reflectance_ratio.by_one_sensor(p.sensors, p.mean_sensor, gaps, u.intensity)
+    seen = reflectance_ratio.by_one_sensor(
+        p.reflectance, p.sensors, p.mean_sensor, line_1, line_2, u.intensity
+    )
     rho = _imbalance(estimate, seen)
     offset = _offset_to_middle(p, u, gaps, line_1, line_2, rho)
     target = wrist_guidance.within(_middle(u) + offset, x.fingertips)
