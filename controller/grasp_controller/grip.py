@@ -48,10 +48,8 @@ AT_REST = State(0.0, 0.0)
 def change(grip_force: float, squeeze: float, brake: float, share: float) -> float:
     """Return P - A in N, what is added to the mean squeeze A - D_i·v; `brake` is D_i·v.
 
-    Zero where no grip force is asked for.
+    There is a grip force, above 0.
     """
-    if grip_force <= 0.0:
-        return 0.0
     drive = squeeze + brake
     limited = min(drive, grip_force + max(0.0, brake))
     return limited + share * max(0.0, grip_force - limited) - drive  # (G1)

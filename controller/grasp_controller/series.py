@@ -181,6 +181,8 @@ def brake(p: layer_1.Params, u: Inputs) -> float:
 
 def _gripped(p: Params, x: State, u: Inputs, h: float) -> tuple[grip.State, Pair]:
     """How far the grip force has come h seconds later, and the rates of the light in 1/s."""
+    if p.contact_force.grip_force <= 0.0:
+        return grip.AT_REST, (0.0, 0.0)
     squeeze, floor = published_squeeze(p, x, u), p.impact_reduction.intensity_floor
     return gripped(p.contact_force, floor, squeeze, x.grip, x.light_rate, x.intensity, u, h)
 
@@ -195,13 +197,11 @@ def gripped(
     u: Inputs,
     h: float,
 ) -> tuple[grip.State, Pair]:
-    """How far the grip force has come h seconds later, and the rates of the light in 1/s.
+    """How far a grip force above 0 has come h seconds later, and the rates of the light in 1/s.
 
     The squeeze by Eq. (7) in N and the samples u are held; the intensities before them are in V.
     """
     force = p.grip_force
-    if force <= 0.0:
-        return grip.AT_REST, (0.0, 0.0)
     (xi_1, xi_2), (before_1, before_2), (rate_1, rate_2) = u.intensity, previous_xi, rates
     rate_1 = grip.light_rate(floor, rate_1, xi_1, before_1, h)
     rate_2 = grip.light_rate(floor, rate_2, xi_2, before_2, h)

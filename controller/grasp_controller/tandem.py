@@ -183,7 +183,8 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     seen = reflectance_ratio.by_one_sensor(
         p.reflectance, p.sensors, p.mean_sensor, x.line_1, x.line_2, u.intensity
     )
-    pressed = holding.pressed(p.hold, -0.5 * _published_force(p, x.virtual, u), closing)
+    squeeze = -0.5 * _published_force(p, x.virtual, u)
+    pressed = holding.pressed(p.hold, squeeze, closing)
     lasting = holding.lasting(p.hold, x.lasting, pressed, h)
     eye_1, eye_2 = p.sensors
     touching_1 = holding.touching(p.hold, p.reflectance, eye_1, x.line_1, lasting)
@@ -210,17 +211,12 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
         pull = max(SOFTEST, power(1.0 - rho * rho, p.simultaneous_contact.patience))
     f_p = layer_2.virtual_forces(p.impact_reduction, seen, x.intensity, h)
     virtual = _closed(p, x.virtual, pull, f_p, h)
-    squeeze = -0.5 * _published_force(p, x.virtual, u)
-    gripping, light_rate = gripped(
-        p.contact_force,
-        floor,
-        squeeze,
-        x.grip,
-        x.light_rate,
-        x.intensity,
-        u._replace(intensity=seen),
-        h,
-    )
+    gripping, light_rate = grip.AT_REST, (0.0, 0.0)
+    if p.contact_force.grip_force > 0.0:
+        samples = u._replace(intensity=seen)
+        gripping, light_rate = gripped(
+            p.contact_force, floor, squeeze, x.grip, x.light_rate, x.intensity, samples, h
+        )
     return State(
         virtual, wrist_command, target, x.fingertips, seen, f_p,
         line_1, line_2, estimate, closing, lasting, hold, gripping, light_rate,

@@ -117,7 +117,6 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     x_1, x_2 = x.position
     (right, _, _), (left, _, _) = p.sides
     gap_1, gap_2 = x_1 - right, -x_2 - left
-    right_touch, left_touch = x.touch
     return Outputs(
         x.position,
         x.velocity,
@@ -127,11 +126,7 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
         p.initial_object_position,
         _squeeze(gap_1, gap_2),
         x.damaged,
-        (right_touch.impulse, 0.0 - left_touch.impulse),
-        (right_touch.first_time, left_touch.first_time),
-        (right_touch.speed, left_touch.speed),
-        (right_touch.touched, left_touch.touched),
-        (right_touch.impact, 0.0 - left_touch.impact),
+        *touch.outputs(x.touch),
     )
 
 

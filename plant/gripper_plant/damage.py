@@ -6,7 +6,9 @@ Equations: plant/README.md
 
 from typing import NamedTuple
 
-BLOW = 0.02
+from .touch import IMPACT_WINDOW
+
+BLOW = IMPACT_WINDOW
 """s from where a finger touches: so long its contact force is a blow, later it holds."""
 
 

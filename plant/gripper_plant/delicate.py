@@ -244,7 +244,6 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """The outputs, as the sensors see them; no input reaches an output without a step."""
     depth_1, depth_2 = _depths(p, x.position, x.object[0])
     z_1, z_2 = x.dashpot
-    right_touch, left_touch = x.touch
     hold_1, hold_2 = _holds(p, x.contact_force)
     return Outputs(
         x.position,
@@ -263,11 +262,7 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
         hanging.slip(x.height),
         x.dropped,
         x.height.tips,
-        (right_touch.impulse, 0.0 - left_touch.impulse),
-        (right_touch.first_time, left_touch.first_time),
-        (right_touch.speed, left_touch.speed),
-        (right_touch.touched, left_touch.touched),
-        (right_touch.impact, 0.0 - left_touch.impact),
+        *touch.outputs(x.touch),
     )
 
 

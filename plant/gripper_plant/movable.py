@@ -87,7 +87,6 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     x_1, x_2 = x.position
     q = standing.shape(p)
     right, left = standing.faces(q, x.box)
-    right_touch, left_touch = x.touch
     return Outputs(
         x.position,
         x.velocity,
@@ -97,11 +96,7 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
         standing.centre(q, x.box),
         x.box.tilt,
         x.toppled,
-        (right_touch.impulse, 0.0 - left_touch.impulse),
-        (right_touch.first_time, left_touch.first_time),
-        (right_touch.speed, left_touch.speed),
-        (right_touch.touched, left_touch.touched),
-        (right_touch.impact, 0.0 - left_touch.impact),
+        *touch.outputs(x.touch),
     )
 
 

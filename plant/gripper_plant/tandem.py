@@ -198,7 +198,6 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     x_1, x_2 = middle + half, middle - half
     right, left = standing.faces(q, body.box)
     f_1, f_2 = body.contact_force
-    right_touch, left_touch = body.touch
     return Outputs(
         (x_1, x_2),
         (speed + closing, speed - closing),
@@ -211,11 +210,7 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
         middle,
         speed,
         f_1 + f_2,
-        (right_touch.impulse, 0.0 - left_touch.impulse),
-        (right_touch.first_time, left_touch.first_time),
-        (right_touch.speed, left_touch.speed),
-        (right_touch.touched, left_touch.touched),
-        (right_touch.impact, 0.0 - left_touch.impact),
+        *touch.outputs(body.touch),
     )
 
 

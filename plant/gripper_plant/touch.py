@@ -157,4 +157,26 @@ ImpactImpulse: TypeAlias = Annotated[
         depends_on=set(),
     ),
 ]
-"""The outputs of every plant with two fingers, in this order."""
+"""What is felt, as a plant puts it out."""
+
+
+class Felt(NamedTuple):
+    """The outputs of every plant with two fingers, in this order."""
+
+    contact_impulse: ContactImpulse
+    first_contact_time: FirstContactTime
+    impact_velocity: ImpactVelocity
+    touched: Touched
+    impact_impulse: ImpactImpulse
+
+
+def outputs(x: TouchPair) -> Felt:
+    """What the plant puts out of its fingers' touches, the impulses with the sign of the force."""
+    right, left = x
+    return Felt(
+        (right.impulse, 0.0 - left.impulse),
+        (right.first_time, left.first_time),
+        (right.speed, left.speed),
+        (right.touched, left.touched),
+        (right.impact, 0.0 - left.impact),
+    )
