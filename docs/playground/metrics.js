@@ -6,7 +6,6 @@ const CLOSING = { 1: -1, 2: 1 };
 const IMPACT = 0.02, STEADY = 0.1, SETTLED = 0.02; // s; s; share of the steady force
 
 const FINGERS = [1, 2];
-const mean = (values) => values.reduce((sum, v) => sum + v, 0) / values.length;
 
 function largest(values) {
   let most = 0;
@@ -22,40 +21,11 @@ function interpolated(t, times, values) {
     : values[k - 1] + (values[k] - values[k - 1]) / (times[k] - times[k - 1]) * (t - times[k - 1]);
 }
 
-// How fast the object's surface goes ahead of a finger that is free up to row k: over the last step
-// of the plant, as far as its outputs show how long that is.
-function surfaceSpeed(run, j, k, outputs) {
-  const changed = (i) => i === 0 || outputs.some((values) => values[i] !== values[i - 1]);
-  let newest = k;
-  while (!changed(newest)) newest--;
-  if (newest === 0) return 0;
-  let own = Infinity;
-  for (let i = newest - 1, later = newest; i >= 0 && own > 1; i--) {
-    if (changed(i)) [own, later] = [Math.min(own, later - i), i];
-  }
-  const last = k - (k - newest) % own, first = last - own;
-  const gap = run.of("plant.gap", j), position = run.of("plant.position", j);
-  const surface = (i) => CLOSING[j] * position[i] + gap[i];
-  return (surface(last) - surface(first)) / (run.time[last] - run.time[first]);
-}
-
-function firstContact(run, j, outputs) {
-  const row = run.of("plant.contact", j).indexOf(1);
+// As the plant tells it, also of a contact between two rows.
+function firstContact(run, j) {
+  const since = run.of("plant.first_contact_time", j), row = since.findIndex((t) => t >= 0);
   if (row < 0) return null;
-  const k = Math.max(row - 1, 0);
-  const speed = CLOSING[j] * run.of("plant.velocity", j)[k] - surfaceSpeed(run, j, k, outputs);
-  const gap = Math.max(run.of("plant.gap", j)[k], 0), span = run.time[row] - run.time[k];
-  const wait = speed > 0 ? Math.min(gap / speed, span) : span;
-  return { t: run.time[k] + wait, speed, row };
-}
-
-function impulse(after, force) {
-  if (!(after[1] <= IMPACT) || after[after.length - 1] < IMPACT) return null;
-  const inner = after.filter((t) => t > 0 && t < IMPACT), times = [0, ...inner, IMPACT];
-  const at = times.map((t) => interpolated(t, after, force));
-  let sum = 0;
-  for (let i = 1; i < times.length; i++) sum += (times[i] - times[i - 1]) * (at[i] + at[i - 1]) / 2;
-  return sum;
+  return { t: run.time[0] + since[row], speed: run.of("plant.impact_velocity", j)[row], row };
 }
 
 function settling(after, force, steady) {
@@ -78,22 +48,22 @@ function drift(run) {
 // A run has time, signal(name) and of(name, finger), which are arrays of all rows.
 function metricsOf(run) {
   const { time } = run, n = time.length - 1, last = (values) => values[n];
-  const outputs = [run.signal("plant.object_position"), ...FINGERS.flatMap((j) => [
-    "position", "velocity", "gap", "contact_force", "contact"].map((q) => run.of(`plant.${q}`, j)))];
   const late = rowAt(time, time[n] - STEADY);
   const fingers = FINGERS.map((j) => {
-    const contact = firstContact(run, j, outputs), gap = run.of("plant.gap", j);
+    const contact = firstContact(run, j), gap = run.of("plant.gap", j);
     const force = run.of("plant.contact_force", j).map(Math.abs), held = force.subarray(late);
     const row = contact ? contact.row : n + 1;
     const after = time.subarray(row).map((t) => t - (contact ? contact.t : 0));
-    const pressed = force.subarray(row), average = mean(held);
+    const pressed = force.subarray(row), impulse = run.of("plant.contact_impulse", j).map(Math.abs);
+    const average = (last(impulse) - impulse[late]) / (time[n] - time[late]);
     const steady = held.every((f) => f > 0) ? average : null;
     return {
       time_to_contact: contact && contact.t,
       remaining_gap: contact ? null : last(gap),
       smallest_gap: contact ? null : gap.reduce((a, b) => Math.min(a, b)),
       impact_velocity: contact && contact.speed > 0 ? contact.speed : null,
-      impact_impulse: impulse(after, pressed),
+      impact_impulse: after[after.length - 1] >= IMPACT
+        ? Math.abs(last(run.of("plant.impact_impulse", j))) : null,
       peak_contact_force: largest(force),
       steady_contact_force: average,
       force_overshoot: steady === null || !pressed.length
