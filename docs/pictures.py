@@ -125,7 +125,7 @@ def draw_evaluation(folder: Path) -> None:
     """contact_times.png and contact_forces.png, which are in the page of `evaluate`."""
     evidence = reproduce(grasp_system(), "simulation", os.cpu_count() or 1, progress=False)
     for name, (title, figure) in figures(evidence, "simulation").items():
-        if name != "target_position":
+        if not name.startswith("target_position"):
             add_heading(
                 figure, Caption(f"Published simulation, GraspController: {title}", about({}))
             )
