@@ -72,7 +72,8 @@ extern char stack_low[], stack_top[], data_low[], data_top[], data_in_flash[], b
 /* What is left of a period: a count of ticks since another is their difference. */
 static uint32_t ticks_since(uint32_t before)
 {
-    return (before + PERIOD - TIMER[2]) % PERIOD;
+    const uint32_t period = TIMER[1] + 1;
+    return (before + period - TIMER[2]) % period;
 }
 
 static uint32_t stack_used(void)
@@ -138,9 +139,9 @@ static void measure_keyed_step(const GraspController_Parameters *p, GraspControl
     if (!grasp_controller_link_answer(&link_to_proxy, 0.0, answer))
         fail("no session ", 0);
     size = packed(GRASP_CONTROLLER_STEP, 2, h, body);
-    while (!(PENDING & DUE)) __asm volatile("wfi");
-    PENDING = SEEN;
-    before = TIMER[2];
+    TIMER[1] = 0xFFFFFF; /* the longest period: it may take more than a step */
+    TIMER[2] = 0;        /* which begins it */
+    while (!(before = TIMER[2]));
     grasp_controller_link_receive(&link_to_proxy, datagram, size, 0, answer, &n);
     memcpy(&u, recorded, sizeof u);
     if (GraspController_step(p, &u, h, x, &y, NULL))

@@ -5,10 +5,10 @@ one colour would give them, and fades as the fingers hold:
 
     f_sk = (1 - h)·K_s·(phi_k - <phi>),   phi of  exp(min b - b_k)·xi_k       Eq. (2N')
 
-Each finger's line (reflectance_ratio.py) gives a_k = ln(K·alpha_k) with the variance V_k; the prior
-of ln alpha_k is N(mu, sigma_b^2/2), its mean unknown, as is K:
+Each finger's line (reflectance_ratio.py) gives a_k = ln(K·alpha_k) with the variance N_k by noise;
+the prior of ln alpha_k is N(mu, sigma_b^2/2), its mean unknown, as is K:
 
-    g_k = v/(v + V_k),    v = sigma_b^2/2,    mu = sum g_k·a_k/sum g_k
+    g_k = v/(v + N_k),    v = sigma_b^2/2,    mu = sum g_k·a_k/sum g_k
     b_k = t·g_k·(a_k - mu)     (R7)
     t = min(1, beta_max/(largest less smallest a_k with a slope))
 
@@ -18,7 +18,7 @@ Equations: controller/README.md
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import exp, inf, log, sqrt
+from math import exp, inf, sqrt
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from block_variables import Output, Parameter
@@ -226,7 +226,7 @@ def brightnesses(p: Params, lines: Lines) -> Brightness:
     gains = tuple(gain(p.reflectance, line) for line in lines)
     # a_k = ln alpha_k, but for what all have in common
     logs = tuple(
-        eye.n * log(line.per_y) - (eye.log_gain - p.mean_sensor.log_gain)
+        eye.n * line.log_per_y - (eye.log_gain - p.mean_sensor.log_gain)
         for eye, line in zip(p.sensors, lines, strict=True)
     )
     total, weighted, low, high = 0.0, 0.0, inf, -inf
@@ -262,17 +262,17 @@ def squares(lines: Lines, logs: PerFinger) -> float:
 
 
 def gain(p: Reflectance, line: Line) -> float:
-    """g_k: how far a line is believed, from 0 without a slope to 1."""
+    """g_k: how far noise lets a line be believed, from 0 without a slope to 1."""
     v = _prior(p)
-    return v / (v + line.variance) if v > 0.0 else 0.0  # g_k of (R7)
+    return v / (v + line.noise_variance) if v > 0.0 else 0.0  # g_k of (R7)
 
 
 def deviation(p: Reflectance, line: Line, full: float, share: float) -> float:
     """The standard deviation of ln alpha_k to the mean that is left, b_k being share·full."""
     v = _prior(p)
-    left = v / (1.0 + v / line.brightness_variance)
-    missed = (1.0 - share) * full
-    return sqrt(left + missed * missed)
+    known = v / (v + line.brightness_variance) if v > 0.0 else 0.0
+    missed = (1.0 - share) * known * full
+    return sqrt(v * (1.0 - known) + missed * missed)
 
 
 def by_one_sensor(p: Params, lines: Lines, intensity: PerFinger) -> PerFinger:

@@ -7,15 +7,16 @@ Derivation: controller/README.md
     (R1) y = kappa·(s - surface + l_0),   kappa = (K·alpha)^(-1/n)
     (R2) w = xi^q·travel                  weight of a point, by the travel that it stands for
     (R3) kappa = C_sy/C_ss                from weighted sums about the weighted means
-    (R4) beta = p·sigma_b^2/(sigma_b^2 + V)·f,   p = 1 - exp(-f^2/(2·gamma^2·V)),   V = V_1 + V_2,
+    (R4) beta = p·sigma_b^2/(sigma_b^2 + N)·f,   p = clip(2 - 2·gamma·sqrt(V)/|f|, 0, 1),
          f = clip(ln alpha_1 - ln alpha_2, -beta_max, beta_max),   ln alpha = -n·ln kappa - ln K
-    (R5) sigma^2·Q/C_sy^2,     Q = sum of (w·xi^(-1-1/n)·(s - mean of s))^2·(1 + 2·T_f/h)
+    (R5) N = N_1 + N_2,   N_j = sigma^2·Q/C_sy^2,
+         Q = sum of (w·xi^(-1-1/n)·(s - mean of s))^2·(1 + 2·T_f/h)
     (R10) what one sensor with the mean n, l_0 and K gives at the gaps that are learnt
-    (R11) V_j: (R5), and the squares of what errors of the calibration move
+    (R11) V = V_1 + V_2,   V_j: N_j, and the squares of what errors of the calibration move
 """
 
 from dataclasses import dataclass
-from math import exp, expm1, inf, log, sqrt
+from math import exp, inf, log, sqrt
 from typing import Annotated, NamedTuple, TypeAlias
 
 from block_variables import Group, Output, Parameter
@@ -125,13 +126,13 @@ class Learning(Group):
     caution: Annotated[
         float,
         Parameter(
-            "gamma, deviations below which a ratio hardly acts; 0: any acts",
+            "gamma, deviations below which a ratio does not act; 0: any acts",
             unit="1",
             low=0.0,
             high=10.0,
             tunable=True,
         ),
-    ] = 0.5
+    ] = 0.65
     prior_deviation: Annotated[
         float,
         Parameter(
@@ -204,8 +205,9 @@ class Line(NamedTuple):
     `ahead` is the way in m of the finger before its low-passed place s. `q_0` to `q_2` are sums of
     the noise of the points, by powers of their distance from the mean. `c_so` and `c_sn` are those
     of how an error of the offset and of n moves y. `per_y` is 1/kappa in m.V^(1/n); 1 where there
-    is no slope yet. `variance` is that with which light tells whether the gaps are equal, and
-    `brightness_variance` that of ln alpha; infinite without a slope.
+    is no slope yet. `noise_variance` is that of n·ln kappa by noise, `variance` that with which
+    light tells whether the gaps are equal, and `brightness_variance` that of ln alpha; infinite
+    without a slope.
     """
 
     intensity: float
@@ -225,6 +227,8 @@ class Line(NamedTuple):
     q_1: float
     q_2: float
     per_y: float
+    log_per_y: float
+    noise_variance: float
     variance: float
     brightness_variance: float
 
@@ -306,30 +310,33 @@ def moved(
     q_0 = line.q_0 + noise
     q_1 = line.q_1 - shift * line.q_0 + noise * distance
     q_2 = line.q_2 + shift * (shift * line.q_0 - 2.0 * line.q_1) + noise * distance * distance
-    per_y, variance, brightness_variance = 1.0, inf, inf
+    per_y, log_per_y, noise_variance, variance, brightness_variance = 1.0, 0.0, inf, inf, inf
     if 0.0 < c_ss < inf and 0.0 < c_sy < inf and 0.0 < q_2 < inf:
         per_y = c_ss / c_sy  # 1/kappa, (R3)
+        log_per_y = log(per_y)
         relative = p.intensity_noise / c_sy
+        noise_variance = relative * relative * q_2  # (R5)
         # (R11)
         by_offset = p.offset_deviation * c_so / c_sy
-        known = relative * relative * q_2 + by_offset * by_offset
+        known = noise_variance + by_offset * by_offset
         bend = c_sn / c_sy
         by_n = p.exponent_deviation * (bend - log_y)
         by_l_0 = p.offset_distance_deviation * eye.n / (y * per_y)
         variance = known + by_n * by_n + by_l_0 * by_l_0
-        by_n = p.exponent_deviation * (bend + log(per_y))
+        by_n = p.exponent_deviation * (bend + log_per_y)
         brightness_variance = known + by_n * by_n + p.gain_deviation * p.gain_deviation
     means = (total, mean_s, line.mean_y + new * from_y)
     more = (line.mean_o + new * from_o, line.mean_n + new * from_n)
     sums = (c_ss, c_sy, c_so, c_sn, q_0, q_1, q_2)
     last = (xi_f, s_f, y, s - s_f)
-    return Line(*last, *means, *more, *sums, per_y, variance, brightness_variance)
+    told = (per_y, log_per_y, noise_variance, variance, brightness_variance)
+    return Line(*last, *means, *more, *sums, *told)
 
 
 def _point(xi_f: float, s_f: float, y: float, log_y: float, ahead: float) -> Line:
     sums = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     return Line(
-        xi_f, s_f, y, ahead, 0.0, s_f, y, y / xi_f, y * log_y, *sums, 1.0, inf, inf
+        xi_f, s_f, y, ahead, 0.0, s_f, y, y / xi_f, y * log_y, *sums, 1.0, 0.0, inf, inf, inf
     )  # fmt: skip
 
 
@@ -371,24 +378,26 @@ def both_moved(
 
 
 def ratio(p: Params, eyes: Sensors, line_1: Line, line_2: Line) -> Estimate:
-    """The logarithm of the ratio, drawn towards 0 as far as the lines are uncertain."""
+    """The logarithm of the ratio, drawn towards 0 as far as noise makes the lines uncertain.
+
+    What is uncertain by calibration does not fade it: that would leave a share of a ratio that is
+    plain. It decides whether there is a ratio, see evidence().
+    """
     prior = p.prior_deviation * p.prior_deviation
     if prior == 0.0:
         return Estimate(0.0, 0.0, 1.0)
     eye_1, eye_2 = eyes
-    log_1, log_2 = log(line_1.per_y), log(line_2.per_y)
+    log_1, log_2 = line_1.log_per_y, line_2.log_per_y
     fitted = (
         0.5 * (eye_1.n + eye_2.n) * (log_1 - log_2)
         + 0.5 * (eye_1.n - eye_2.n) * (log_1 + log_2)
         - (eye_1.log_gain - eye_2.log_gain)
     )
     within = _clamped(fitted, -p.limit, p.limit)
-    variance = max(line_1.variance + line_2.variance, TINY)
-    gain = prior / (prior + variance)
-    share = evidence(p, within * within / variance)
-    beta = share * gain * within  # (R4)
-    variance = line_1.brightness_variance + line_2.brightness_variance
-    gain = prior / (prior + variance)
+    share = evidence(p, within * within / max(line_1.variance + line_2.variance, TINY))
+    noise_variance = line_1.noise_variance + line_2.noise_variance
+    beta = share * prior / (prior + noise_variance) * within  # (R4)
+    gain = prior / (prior + (line_1.brightness_variance + line_2.brightness_variance))
     missed = (1.0 - share) * gain * within
     spread = prior * (1.0 - gain) + missed * missed
     return Estimate(beta, sqrt(spread), exp(-abs(beta)))
@@ -401,11 +410,12 @@ TINY = 1e-60
 def evidence(p: Learning, squares: float) -> float:
     """How far a ratio acts that is sqrt(`squares`) deviations off 1, from 0 to 1.
 
-    With gamma = 1 it is one less the likelihood ratio of equal faces to those that were fitted.
+    While errors stay within gamma deviations, what acts is at most twice the true logarithm. So the
+    gaps are never less equal than without it.
     """
-    if p.caution == 0.0:
-        return 1.0
-    return -expm1(-0.5 * squares / (p.caution * p.caution))
+    if squares <= 0.0:
+        return 1.0 if p.caution == 0.0 else 0.0
+    return _clamped(2.0 - 2.0 * p.caution / sqrt(squares), 0.0, 1.0)  # p of (R4)
 
 
 def alike(estimate: Estimate, xi: Pair) -> Pair:
@@ -466,9 +476,9 @@ def gap(p: Learning, eye: Sensor, line: Line) -> float:
 
 
 def known(p: Learning, line: Line) -> float:
-    """How far the slope of a line is known, from 0 without one to 1."""
+    """How far the slope of a line is known from noise, from 0 without one to 1."""
     prior = p.prior_deviation * p.prior_deviation
-    return prior / (prior + line.variance) if prior > 0.0 else 0.0
+    return prior / (prior + line.noise_variance) if prior > 0.0 else 0.0
 
 
 def _clamped(x: float, low: float, high: float) -> float:

@@ -343,7 +343,7 @@ def line_at(gap, known=True, **more):
     point = reflectance_ratio.first_point(EYE, 1e-6, 0.05, y**-n)
     if not known:
         return point
-    return point._replace(per_y=(gap + 5e-3) / y, variance=0.0, **more)
+    return point._replace(per_y=(gap + 5e-3) / y, noise_variance=0.0, **more)
 
 
 def touching(line, lasting=0.3):
@@ -361,7 +361,7 @@ def test_half_a_contact_is_at_l_h(gap, near):
 def test_without_a_line_only_time_tells_of_a_contact():
     assert touching(line_at(0.0, known=False), 0.3) == 0.3
     assert touching(line_at(0.1, known=False), 0.3) == 0.3
-    half = line_at(6e-3)._replace(variance=reflectance_ratio.Params().prior_deviation ** 2)
+    half = line_at(6e-3)._replace(noise_variance=reflectance_ratio.Params().prior_deviation ** 2)
     assert touching(half, 0.3) == pytest.approx(0.5 * (1 / 257 + 0.3), abs=1e-9)
     after = holding.lasting(HOLD, 0.0, 1.0, 1e-3)
     assert after == pytest.approx(1e-3 / HOLD.blind_time, rel=2e-3)

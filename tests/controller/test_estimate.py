@@ -292,16 +292,22 @@ def test_the_variance_by_calibration_is_that_of_small_errors(alpha, end):
 
 
 @pytest.mark.parametrize("gamma", [0.5, 1.0])
-def test_a_ratio_acts_by_the_likelihood_of_equal_faces(gamma):
-    """1 - (L(0)/L(f))^(1/gamma^2), L being normal about the fitted f."""
+@pytest.mark.parametrize("off", [0.9, 1.2, 1.7, 2.5])
+def test_a_ratio_acts_from_gamma_deviations_on(gamma, off):
+    """By 2·(f - gamma·sigma), up to f; here f is `off`·gamma deviations."""
     samples = approach((0.9, 1.0))
     one = run(replace(SURE, reflectance=replace(SURE.reflectance, offset_deviation=1.0)), samples)
-    V = one[-1][0].line_1.variance + one[-1][0].line_2.variance
-    known = {"offset_deviation": 0.1 / (gamma * sqrt(V)), "prior_deviation": 10.0}
-    f = run(replace(SURE, reflectance=replace(SURE.reflectance, **known)), samples)[-1][0]
-    cautious = replace(SURE.reflectance, caution=gamma, **known)
-    x = run(replace(SURE, reflectance=cautious), samples)[-1][0]
-    V = x.line_1.variance + x.line_2.variance
-    acts = 1.0 - exp(-(f.estimate.beta**2) / (2.0 * V)) ** (1.0 / gamma**2)
-    assert 0.05 < acts < 0.95
-    assert x.estimate.beta == pytest.approx(acts * f.estimate.beta, rel=1e-3)
+    sigma = sqrt(one[-1][0].line_1.variance + one[-1][0].line_2.variance)
+    f = abs(run(SURE, samples)[-1][0].estimate.beta)
+    known = {"offset_deviation": f / (off * gamma * sigma), "caution": gamma}
+    x = run(replace(SURE, reflectance=replace(SURE.reflectance, **known)), samples)[-1][0]
+    acts = min(max(2.0 * (f - f / off), 0.0), f)
+    assert x.estimate.beta == pytest.approx(-acts, rel=1e-2, abs=1e-12)
+
+
+@given(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(1e-3, 1.0), st.floats(0.1, 3.0))
+def test_what_acts_is_no_worse_than_nothing_within_gamma_deviations(true, error, sigma, gamma):
+    f = true + error * gamma * sigma
+    p = replace(SURE.reflectance, caution=gamma)
+    acts = reflectance_ratio.evidence(p, f * f / (sigma * sigma)) * f
+    assert abs(acts - true) <= abs(true) * (1.0 + 1e-9) + 1e-12

@@ -187,7 +187,7 @@ def test_half_a_grasp_is_half_of_the_force_on_each_finger():
     u = Inputs((0.035, -0.035), (0.0, 0.0), (0.4, 0.4))
     x = tandem.initial_state(Params(), u)._replace(virtual=(0.035 - 0.1 / 98.0, 0.0))
     # Both lines say that the finger is at its face
-    at_face = x.line_1._replace(per_y=5e-3 / x.line_1.y, variance=0.0)
+    at_face = x.line_1._replace(per_y=5e-3 / x.line_1.y, noise_variance=0.0)
     x = x._replace(line_1=at_face, line_2=at_face)
     assert tandem.step(Params(), x, u, 0.02).hold == pytest.approx(0.5, abs=1e-9)
     closing = u._replace(velocity=(-1e-3, 1e-3))

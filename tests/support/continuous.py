@@ -36,7 +36,7 @@ class Adaptive:
     sigma_n: float = 0.01
     sigma_c: float = 1.8e-3
     sigma_K: float = 0.05
-    gamma: float = 0.5
+    gamma: float = 0.65
     P_0: float = 0.1
     w_0: float = 5e-4
     T_w: float = 0.02
@@ -121,17 +121,16 @@ class Learning:
         xi_1, xi_2 = self.xi_0
         fitted = log(xi_1 / xi_2) - self.p.n * log(kappa_1 / kappa_2)
         prior, most = self.p.sigma_b**2, self.p.beta_max
-        (gaps_1, faces_1), (gaps_2, faces_2) = (
+        (noise_1, gaps_1, faces_1), (noise_2, gaps_2, faces_2) = (
             self._variances(line, kappa, xi_0)
             for line, kappa, xi_0 in ((line_1, kappa_1, xi_1), (line_2, kappa_2, xi_2))
         )
         fitted = min(max(fitted, -most), most)
-        variance = gaps_1 + gaps_2
-        acts = 1.0 - exp(-(fitted**2) / (2.0 * self.p.gamma**2 * variance))
+        off = abs(fitted) / (self.p.gamma * sqrt(gaps_1 + gaps_2))  # in gamma deviations
+        acts = min(2.0 - 2.0 / off, 1.0) if off > 1.0 else 0.0
         gain = prior / (prior + faces_1 + faces_2)
-        missed = (1.0 - acts) * gain * fitted
-        deviation = sqrt(prior * (1.0 - gain) + missed**2)
-        return acts * prior / (prior + variance) * fitted, deviation
+        deviation = sqrt(prior * (1.0 - gain) + ((1.0 - acts) * gain * fitted) ** 2)
+        return acts * prior / (prior + noise_1 + noise_2) * fitted, deviation
 
     def rates(self, z, s, xi, closing, u):
         """The derivative of the state, at ways s in m, intensities xi in V and forces u in N."""
@@ -159,7 +158,7 @@ class Learning:
         return [xi_rate, s_rate, *sums, noise, noise * at, noise * at * at]
 
     def _variances(self, line, kappa, xi_0):
-        """V_j and that of ln alpha_j.
+        """N_j, V_j and that of ln alpha_j.
 
         White noise has the density 2·T_f·sigma^2 in what the slope is made of. The errors of the
         calibration change the slope of y, and that of n also the line that y is compared with.
@@ -175,7 +174,7 @@ class Learning:
         anywhere = bend - log(kappa) + log(MILLIMETRE)
         both = by_noise + by_c**2
         gaps = both + (self.p.sigma_n * here) ** 2
-        return gaps, both + (self.p.sigma_n * anywhere) ** 2 + self.p.sigma_K**2
+        return by_noise, gaps, both + (self.p.sigma_n * anywhere) ** 2 + self.p.sigma_K**2
 
 
 def _lines(z):

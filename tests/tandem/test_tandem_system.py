@@ -213,8 +213,8 @@ def test_a_plant_of_others_has_the_metrics_that_it_permits(command, moved, tmp_p
     assert command("build", "vendor.py", "--out", ".")[0] == 0
     assert command("init", "mine.toml", "--tandem", "--as", "plant=Vendor.fmu")[0] == 0
     run = simulate(System.load("mine.toml"))
-    assert run.metrics["time_to_contact"] == moved.metrics["time_to_contact"]
-    assert run.metrics["impact_velocity"] == moved.metrics["impact_velocity"]
+    for name in ("time_to_contact", "impact_velocity"):  # of samples, and as the plant has them
+        assert run.metrics[name] == pytest.approx(moved.metrics[name], rel=1e-3)
     assert "steady_contact_force" not in run.metrics
     assert [said.partition(": ")[2] for said in run.measured.missing] == [
         "plant lacks contact_force[1]",

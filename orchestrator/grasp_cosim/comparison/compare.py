@@ -19,7 +19,7 @@ from .bands import SHARE, Bands
 from .judge import Judge, Values, common_curves
 from .offset import fit_offset, shifted
 from .outcome import ComparisonData
-from .side import Side, differences, read_side, side_of
+from .side import Side, differences, read_side, side_of, unread
 from .summary import short_text
 from .tube import ROUNDING
 
@@ -91,6 +91,8 @@ def compare(
     changes, stated = _changes(first_part, second_part), bands or Bands()
     first_metrics = _metrics_of(first, first_part, metrics)
     second_metrics = _metrics_of(second, second_part, metrics)
+    aside = unread(first_part, second_part, (*first_metrics, *second_metrics))
+    first_part, second_part = (replace(s, unread=aside) for s in (first_part, second_part))
     values = first_part.measured(first_metrics), second_part.measured(second_metrics)
     stated.check({**first_part.signals, **second_part.signals}, values[0])
     interval = max(first_part.interval, second_part.interval)
@@ -108,7 +110,7 @@ def compare(
         end=end,
         only=_only(first_part.signals, second_part.signals),
         differences=differences(*runs) if runs else (),
-        notes=(*clock_notes, *_notes(first, second, begin, end, changes)),
+        notes=(*clock_notes, *_notes(first, second, begin, end, changes), *_without(aside)),
     )
 
 
@@ -222,6 +224,12 @@ def _metrics_of(side: Side, part: Side, extra: Sequence[Metric]) -> tuple[Metric
     recorded = side.result.more_metrics if side.result and is_whole else ()
     recorded_besides = [m for m in recorded if m.name not in taken]
     return tuple(m for m in metrics_of(side.groups, [*extra, *recorded_besides]) if not m.reason)
+
+
+def _without(aside: Sequence[str]) -> Iterator[str]:
+    """A line on signals that metrics could have used, had both runs them."""
+    if aside:
+        yield f"metrics of both do without what one run lacks: {choices(aside, 4)}"
 
 
 def _only(

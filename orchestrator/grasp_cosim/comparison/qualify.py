@@ -42,7 +42,7 @@ from .interface_difference import (
 )
 from .judge import Judge
 from .outcome import QualificationData, Swap
-from .side import Side, differences, side_of
+from .side import Side, differences, side_of, unread
 from .summary import short_qualification
 
 END = Metric(
@@ -141,9 +141,10 @@ def qualify(
         definitions = ()
     elif run.ended_at is not None or result.ended_at is not None:
         definitions = (*definitions, END)
+    new = side_of(result, swap.candidate.name).converted(swap.back)
+    original = replace(original, unread=unread(original, new, definitions))
     measured = original.measured(definitions)
     repetitions, numerics = _repetitions(swap.system, original, measured, stated, progress)
-    new = side_of(result, swap.candidate.name).converted(swap.back)
     measured_of_new = replace(original, time=new.time, signals=new.signals).measured(definitions)
     span_ns, step_ns = swap.system.stop_ns - swap.system.start_ns, swap.system.step_ns
     shift = max(SHARE * span_ns, float(FEWEST_STEPS * step_ns)) / NANOSECONDS
@@ -204,7 +205,7 @@ def _other_numerics(system: System, original: Side, progress: bool) -> tuple[lis
     for name, variant in _variants(system):
         try:
             run = simulate(variant, progress=progress and f"original, {name}")
-            runs.append(side_of(run, name))
+            runs.append(replace(side_of(run, name), unread=original.unread))
             numerics.append(name)
         except (InputError, SimulationError) as error:
             numerics.append(f"not {name}: {error}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,7 +16,7 @@ from ..base.files import check_nature
 from ..base.si_units import known_unit
 from ..base.text import counted
 from ..interface.units import IDENTITY, Conversion, conversion
-from ..metrics.metric import Metric, Signals, measure
+from ..metrics.metric import Metric, Signals, measure, optional_signals
 from ..recording.folder import ARROW, SETTINGS, SIGNALS
 from ..recording.log_names import AS_THEY_ARE, LogNames
 from ..recording.read_back import load_run
@@ -53,6 +53,8 @@ class Side:
     groups: Sequence[str] = ()
     silent: tuple[str, ...] = ()
     """The signals of a log that told no unit, and got that of the other run."""
+    unread: Collection[str] = ()
+    """The signals that its metrics do not read, because the other run lacks them."""
 
     def __repr__(self) -> str:
         """What it is called, and how much of it there is."""
@@ -118,7 +120,8 @@ class Side:
 
     def measured(self, metrics: Iterable[Metric]) -> dict[str, float | None]:
         """The metrics as single values by names like time_to_contact[1]; true is 1 and false 0."""
-        signals = Signals(self.time, self.signals, self.roles, self.to_si, self.values)
+        read = {name: x for name, x in self.signals.items() if name not in self.unread}
+        signals = Signals(self.time, read, self.roles, self.to_si, self.values)
         values = measure(signals, metrics).flat()
         return {name: None if v is None else float(v) for name, v in values.items()}
 
@@ -160,6 +163,17 @@ class Side:
             return IDENTITY
         si_units = known_unit(reference_unit), known_unit(own_unit)
         return conversion(si_units[0], si_units[1]) if si_units[0] and si_units[1] else None
+
+
+def unread(a: Side, b: Side, metrics: Iterable[Metric]) -> tuple[str, ...]:
+    """The signals of one run that the other lacks, and that metrics use but can do without.
+
+    A metric of both is then of the same signals: moments of the plant have other errors than those
+    of samples.
+    """
+    metrics = tuple(metrics)
+    optional = {n: None for s in (a, b) for n in optional_signals(metrics, s.signals, s.roles)}
+    return tuple(name for name in optional if (name in a.signals) != (name in b.signals))
 
 
 def side_of(run: Result, called: str) -> Side:

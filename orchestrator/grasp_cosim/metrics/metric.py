@@ -519,6 +519,16 @@ def needed(
     return frozenset(resolved(name, roles) for m in permitted for name in m.reads) & {*names}
 
 
+def optional_signals(
+    metrics: Iterable[Metric], names: Collection[str], roles: Mapping[str, str]
+) -> tuple[str, ...]:
+    """The signals that metrics use where they are there, and that none of them needs."""
+    sized = [m.of(names, roles) for m in metrics]
+    needed_by_any = {name for m in sized for need in m.needs for name in names_of(need)}
+    used = (name for m in sized for need in m.uses for name in names_of(need))
+    return tuple(resolved(n, roles) for n in dict.fromkeys(used) if n not in needed_by_any)
+
+
 def lacking(
     needs: Collection[Need],
     names: Collection[str],
