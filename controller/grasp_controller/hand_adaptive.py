@@ -18,7 +18,7 @@ Equations: controller/README.md
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import exp, inf, sqrt
+from math import exp, inf, log, sqrt
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from block_variables import Output, Parameter
@@ -72,7 +72,7 @@ class Params(hand.Params):
         """Those of all fingers."""
         learnt = self.reflectance
         return tuple(
-            reflectance_ratio.sensor(n, l_0, gain)
+            Sensor(n, l_0, gain)
             for n, l_0, gain in zip(
                 learnt.diffusion_exponent, learnt.offset_distance, learnt.gain, strict=True
             )
@@ -80,13 +80,12 @@ class Params(hand.Params):
 
     @cached_property
     def mean_sensor(self) -> Sensor:
-        """The one that stands for all: mean n and l_0, and the geometric mean of K."""
-        n, l_0, log_gain = 0.0, 0.0, 0.0
+        """The one that stands for all, with the means of n, l_0 and K."""
+        n, l_0, gain = 0.0, 0.0, 0.0
         for eye in self.sensors:
-            n, l_0, log_gain = n + eye.n, l_0 + eye.l_0, log_gain + eye.log_gain
+            n, l_0, gain = n + eye.n, l_0 + eye.l_0, gain + eye.gain
         fingers = float(FINGERS)
-        n, log_gain = n / fingers, log_gain / fingers
-        return Sensor(n, l_0 / fingers, log_gain, exp(log_gain / n))
+        return Sensor(n / fingers, l_0 / fingers, gain / fingers)
 
     @cached_property
     def one_kind(self) -> bool:
@@ -226,7 +225,7 @@ def brightnesses(p: Params, lines: Lines) -> Brightness:
     gains = tuple(gain(p.reflectance, line) for line in lines)
     # a_k = ln alpha_k, but for what all have in common
     logs = tuple(
-        eye.n * line.log_per_y - (eye.log_gain - p.mean_sensor.log_gain)
+        eye.n * line.log_per_y - log(eye.gain / p.mean_sensor.gain)
         for eye, line in zip(p.sensors, lines, strict=True)
     )
     total, weighted, low, high = 0.0, 0.0, inf, -inf

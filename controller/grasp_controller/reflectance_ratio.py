@@ -11,7 +11,7 @@ Derivation: controller/README.md
          f = clip(ln alpha_1 - ln alpha_2, -beta_max, beta_max),   ln alpha = -n·ln kappa - ln K
     (R5) N = N_1 + N_2,   N_j = sigma^2·Q/C_sy^2,
          Q = sum of (w·xi^(-1-1/n)·(s - mean of s))^2·(1 + 2·T_f/h)
-    (R10) what one sensor with the mean n, l_0 and K gives at the gaps that are learnt
+    (R10) what one sensor with the means of n, l_0 and K gives at the gaps that are learnt
     (R11) V = V_1 + V_2,   V_j: N_j, and the squares of what errors of the calibration move
 """
 
@@ -175,28 +175,21 @@ class Params(Learning, name="reflectance"):
 
 
 class Sensor(NamedTuple):
-    """n, l_0 in m and ln K of a sensor, and 1/kappa of a white face in m.V^(1/n)."""
+    """n, l_0 in m and K in V.m^n of a sensor."""
 
     n: float
     l_0: float
-    log_gain: float
-    white: float
+    gain: float
 
 
 Sensors = tuple[Sensor, Sensor]
 """A sensor per finger: right, left."""
 
 
-def sensor(n: float, l_0: float, gain: float) -> Sensor:
-    """The sensor of exponent n, offset l_0 in m and gain K in V.m^n."""
-    log_gain = log(gain)
-    return Sensor(n, l_0, log_gain, exp(log_gain / n))
-
-
 def sensors(p: Params) -> Sensors:
     """Those of both fingers, right and left."""
     (n_1, n_2), (l_1, l_2), (k_1, k_2) = p.diffusion_exponent, p.offset_distance, p.gain
-    return sensor(n_1, l_1, k_1), sensor(n_2, l_2, k_2)
+    return Sensor(n_1, l_1, k_1), Sensor(n_2, l_2, k_2)
 
 
 class Line(NamedTuple):
@@ -391,7 +384,7 @@ def ratio(p: Params, eyes: Sensors, line_1: Line, line_2: Line) -> Estimate:
     fitted = (
         0.5 * (eye_1.n + eye_2.n) * (log_1 - log_2)
         + 0.5 * (eye_1.n - eye_2.n) * (log_1 + log_2)
-        - (eye_1.log_gain - eye_2.log_gain)
+        - log(eye_1.gain / eye_2.gain)
     )
     within = _clamped(fitted, -p.limit, p.limit)
     share = evidence(p, within * within / max(line_1.variance + line_2.variance, TINY))
@@ -431,11 +424,9 @@ def learnt(estimate: Estimate) -> float:
 
 
 def mean_sensor(eyes: Sensors) -> Sensor:
-    """The sensor that stands for both: mean n and l_0, and the geometric mean of K."""
-    eye_1, eye_2 = eyes
-    n = 0.5 * (eye_1.n + eye_2.n)
-    log_gain = 0.5 * (eye_1.log_gain + eye_2.log_gain)
-    return Sensor(n, 0.5 * (eye_1.l_0 + eye_2.l_0), log_gain, exp(log_gain / n))
+    """The sensor that stands for both."""
+    (n_1, l_1, k_1), (n_2, l_2, k_2) = eyes
+    return Sensor(0.5 * (n_1 + n_2), 0.5 * (l_1 + l_2), 0.5 * (k_1 + k_2))
 
 
 def by_one_sensor(
@@ -451,7 +442,7 @@ def by_one_sensor(
 
 def same(eye: Sensor, other: Sensor) -> bool:
     """Whether two sensors are the same."""
-    return eye.n == other.n and eye.l_0 == other.l_0 and eye.log_gain == other.log_gain
+    return eye.n == other.n and eye.l_0 == other.l_0 and eye.gain == other.gain
 
 
 def translated(eye: Sensor, mean: Sensor, gap: float) -> float:
@@ -459,7 +450,7 @@ def translated(eye: Sensor, mean: Sensor, gap: float) -> float:
     gap = max(gap, 0.0)
     d, common = max(gap + eye.l_0, TINY), max(gap + mean.l_0, TINY)
     # (R10)
-    return exp(mean.log_gain - eye.log_gain + eye.n * log(d) - mean.n * log(common))
+    return mean.gain / eye.gain * exp(eye.n * log(d) - mean.n * log(common))
 
 
 def gaps(p: Params, eyes: Sensors, line_1: Line, line_2: Line) -> Pair:
@@ -471,7 +462,8 @@ def gaps(p: Params, eyes: Sensors, line_1: Line, line_2: Line) -> Pair:
 def gap(p: Learning, eye: Sensor, line: Line) -> float:
     """The gap in m of a finger, 1/kappa drawn towards that of a white face as it is uncertain."""
     gain = known(p, line)
-    per_y = (1.0 - gain) * eye.white + gain * line.per_y
+    white = exp(log(eye.gain) / eye.n)
+    per_y = (1.0 - gain) * white + gain * line.per_y
     return line.y * per_y - eye.l_0 + line.ahead  # (R1) for the gap
 
 
