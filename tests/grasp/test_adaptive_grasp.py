@@ -25,14 +25,12 @@ from grasp_cosim.sweeps.rows import grid
 from scipy.optimize import differential_evolution
 from scipy.stats import binom, qmc
 from support import marks
-from support.grasps import adaptive_grasp, last, run, values_of
+from support.grasps import L_0, N, adaptive_grasp, calibrated, last, run, values_of
 
 STEP = 1e-3
 """s, ten times the paper's: nothing below depends on it."""
 
 FINGER = (1, 2)
-
-N, L_0 = 1.1506, 0.005
 
 
 @pytest.mark.parametrize("volts", [0.2, 0.5])
@@ -212,30 +210,14 @@ def test_with_equal_faces_it_does_as_the_published_law(grasp, fmus):
         np.testing.assert_allclose(ours[name], published[name], rtol=0.0, atol=2e-3)
 
 
-def calibrated(n=(1.1506, 1.1506), l_0=(5e-3, 5e-3), gain=(2.4e-3, 2.4e-3)):
-    """Values of sensors, and of the adaptive controller that knows them."""
-    sensors = {"diffusion_exponent": n, "offset_distance": l_0, "gain": gain}
-    of_sensors = {f"sensor_{j}.{k}": v[j - 1] for k, v in sensors.items() for j in FINGER}
-    known = {
-        f"controller.reflectance.{k}[{j}]": v[j - 1] for k, v in sensors.items() for j in FINGER
-    }
-    return of_sensors, known
-
-
-def alike_at_contact(n=(1.1506, 1.1506), l_0=(5e-3, 5e-3)):
-    """Sensors that read 1.07 V of a white face that they touch."""
-    gain = tuple(2.4e-3 * L_0**-N * l**m for m, l in zip(n, l_0, strict=True))
-    return {"n": n, "l_0": l_0, "gain": gain}
-
-
 UNLIKE = [{"n": (1.1, 1.2)}, {"n": (1.2, 1.1)}, {"l_0": (5.5e-3, 4.5e-3)}]
 
 
 @pytest.mark.parametrize("unlike", UNLIKE)
 @pytest.mark.parametrize("alpha", [(1.0, 1.0), (0.57, 1.0), (1.2, 0.4)])
 def test_sensors_that_differ_do_as_equal_ones_by_their_calibration(natives, unlike, alpha):
-    sensors, known = calibrated(**alike_at_contact(**unlike))
-    result = run(adaptive_grasp(natives), {**values_of(alpha), **sensors, **known}, 2e-3, 4.0)
+    values = {**values_of(alpha), **calibrated(2, **unlike)}
+    result = run(adaptive_grasp(natives), values, 2e-3, 4.0)
     assert apart(result) <= 0.03
     assert last(result, "plant.contact_force") == pytest.approx((3.43, -3.43), abs=0.02)
     ratio = float(result["controller.reflectance_ratio"][-1])

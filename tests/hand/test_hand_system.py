@@ -17,6 +17,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
+from support.grasps import calibrated
 from support.marks import needs_compiler, slow
 
 COLOURS = {"sensor_1.reflectance": 0.3, "sensor_2.reflectance": 1.2, "sensor_3.reflectance": 0.6}
@@ -51,6 +52,17 @@ def test_three_fingers_touch_together_and_press_by_their_weights(angles):
     assert metrics["time_difference"] <= 0.02
     assert max(metrics["impact_velocity"]) <= 6.5e-3
     assert max(metrics["force_difference"], metrics["net_force"]) <= 0.01
+
+
+@pytest.mark.parametrize("unlike", [{"n": (1.1, 1.2, 1.15)}, slow({"l_0": (5.5e-3, 4.5e-3, 5e-3)})])
+def test_sensors_that_differ_do_as_equal_ones_by_their_calibration(unlike):
+    system = hand_system(controller="adaptive", native=False).with_values(calibrated(3, **unlike))
+    run = simulate(placed(system, 0.006, -0.008, **COLOURS))
+    assert run.metrics["time_difference"] <= 0.02
+    assert run.metrics["force_difference"] <= 0.01
+    ratios = np.array([run[f"controller.reflectance_ratio[{j}]"][-1] for j in (1, 2, 3)])
+    faces = np.array([*COLOURS.values()])
+    assert ratios == pytest.approx(faces / faces.prod() ** (1 / 3), rel=0.01)
 
 
 def test_the_published_law_tells_no_colour_from_a_gap():

@@ -37,3 +37,19 @@ def last(result, name):
 
 
 CASES = {n: built_in_presets()[f"case_{n}"] for n in NUMBERS}
+
+
+N, L_0 = 1.1506, 5e-3
+"""Of the sensors by default; l_0 in m."""
+
+
+def calibrated(fingers, n=None, l_0=None):
+    """Values of sensors that read 1.07 V of a white face that they touch, which the law knows."""
+    values = {}
+    for j in range(1, fingers + 1):
+        exponent, offset = n[j - 1] if n else N, l_0[j - 1] if l_0 else L_0
+        gain = 2.4e-3 * L_0**-N * offset**exponent
+        sensor = {"diffusion_exponent": exponent, "offset_distance": offset, "gain": gain}
+        values |= {f"sensor_{j}.{name}": value for name, value in sensor.items()}
+        values |= {f"controller.reflectance.{name}[{j}]": v for name, v in sensor.items()}
+    return values

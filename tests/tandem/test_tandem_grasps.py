@@ -19,6 +19,7 @@ from grasp_cosim.tandem.system import SYSTEM
 from scipy.stats.qmc import LatinHypercube
 from support import marks
 from support.continuous import Grasp, solve
+from support.grasps import calibrated
 from support.marks import slow
 
 LATE_POSITIONS = Path(__file__).parents[2] / "docs" / "late_positions.py"
@@ -165,6 +166,19 @@ def test_the_steps_hardly_matter(natives, g):
     wrist_of = [r["plant.wrist_position"] for r in (fine, coarse)]
     assert wrist_of[1] == pytest.approx(wrist_of[0][::10], abs=3e-4)
     assert wrist_of[1][-1] == pytest.approx(g.x_m, abs=1e-5)
+
+
+@pytest.mark.parametrize("unlike", [{"n": (1.1, 1.2)}, slow({"l_0": (5.5e-3, 4.5e-3)})])
+@pytest.mark.parametrize("alpha", [(1.0, 1.0), (0.57, 1.0)])
+def test_sensors_that_differ_do_as_equal_ones_by_their_calibration(natives, unlike, alpha):
+    values = {f"sensor_{j}.reflectance": a for j, a in zip((1, 2), alpha, strict=True)}
+    system = (
+        tandem(natives).with_presets("fixed").with_values({**values, **calibrated(2, **unlike)})
+    )
+    metrics = simulate(system, step=1e-3, stop=6.0).metrics
+    assert metrics["time_difference"] <= Study().apart
+    assert max(metrics["impact_velocity"]) <= Study().impact
+    assert metrics["force_difference"] <= Study().forces
 
 
 @pytest.mark.slow
