@@ -153,6 +153,8 @@ class View(NamedTuple):
     spherical: bool
     sigma: float
     """Standard deviation of the lobe, as the slope of a ray."""
+    fading: float
+    """-1/(2·sigma^2)."""
     exponent: float
     """n of Eq. (9)."""
 
@@ -192,7 +194,7 @@ def brightness(spot: Spot, face: Face, pattern: Pattern, exponent: float, distan
         return 1.0
     k, sine, cosine = face.curvature * distance, sin(face.tilt), cos(face.tilt)
     spherical = face.curvature > 0.0 and not face.cylindrical
-    v = View(k, sine, cosine, k * (k + 2.0 * cosine), spherical, sigma, exponent)
+    v = View(k, sine, cosine, k * (k + 2.0 * cosine), spherical, sigma, -0.5 / (sigma * sigma), exponent)
     low, high = -_end(v, reach, -sine), _end(v, reach, sine)
     place_low, place_high = _place(v, low), _place(v, high)
     if last <= place_low or place_high <= first:
@@ -235,9 +237,7 @@ def _slope(v: View, place: float) -> float:
 def _light(v: View, s: float, t: float) -> float:
     """Of the ray with the slopes s and t."""
     nearness, facing = _hit(v, s, t)
-    lobe = exp(-0.5 * (s * s + t * t) / (v.sigma * v.sigma))
-    fall: float = nearness**v.exponent
-    return facing * fall * lobe
+    return facing * exp(v.exponent * log(nearness) + v.fading * (s * s + t * t))
 
 
 def _strip(v: View, s: float) -> float:
