@@ -264,7 +264,7 @@ DOMAIN = {
     "drift": (-5e-4, 5e-4),
 } | {
     f"{name}_{j}": (-most, most)
-    for name, most in (("n", 2.5e-3), ("c", 4.5e-4), ("K", 0.05), ("l_0", 1e-5))
+    for name, most in (("n", 2e-3), ("c", 4e-4), ("K", 0.05), ("l_0", 1e-5))
     for j in FINGER
 }
 """Of the errors of a calibration, and of the grasps, in which the adaptive law is safe; in SI."""
