@@ -194,7 +194,9 @@ def brightness(spot: Spot, face: Face, pattern: Pattern, exponent: float, distan
         return 1.0
     k, sine, cosine = face.curvature * distance, sin(face.tilt), cos(face.tilt)
     spherical = face.curvature > 0.0 and not face.cylindrical
-    v = View(k, sine, cosine, k * (k + 2.0 * cosine), spherical, sigma, -0.5 / (sigma * sigma), exponent)
+    v = View(
+        k, sine, cosine, k * (k + 2.0 * cosine), spherical, sigma, -0.5 / (sigma * sigma), exponent
+    )
     low, high = -_end(v, reach, -sine), _end(v, reach, sine)
     place_low, place_high = _place(v, low), _place(v, high)
     if last <= place_low or place_high <= first:
