@@ -16,6 +16,8 @@ Derivation: controller/README.md
 from math import expm1, log
 from typing import NamedTuple
 
+from .low_pass import low_passed
+
 LIFT_TIME = 0.4
 """T in s: slow for fingers of up to 2 kg on soft objects."""
 
@@ -58,7 +60,7 @@ def change(grip_force: float, squeeze: float, brake: float, share: float) -> flo
 def light_rate(floor: float, previous: float, xi: float, previous_xi: float, h: float) -> float:
     """xi'/xi in 1/s behind the low-pass, from two samples in V; 0 below the floor."""
     rate = 0.0 if xi < floor or previous_xi < floor else log(xi / previous_xi) / h
-    return _low_passed(previous, rate, h)
+    return low_passed(previous, rate, FILTER_TIME, h)
 
 
 def quiet(rate: float) -> float:
@@ -68,7 +70,7 @@ def quiet(rate: float) -> float:
 
 def advance(x: State, squeeze: float, closing: float, all_quiet: float, h: float) -> State:
     """The state h seconds later: P in N, the rate of closing in m/s and the product of q held."""
-    closing = _low_passed(x.closing, closing, h)
+    closing = low_passed(x.closing, closing, FILTER_TIME, h)
     pressed = squeeze * squeeze if squeeze > 0.0 else 0.0
     least = LEAST_SQUEEZE * LEAST_SQUEEZE
     contact = pressed / (pressed + least) * _within(closing / CLOSING) * all_quiet  # (G3)
@@ -81,7 +83,3 @@ def advance(x: State, squeeze: float, closing: float, all_quiet: float, h: float
 def _within(x: float) -> float:
     square = x * x
     return 1.0 / (1.0 + square * square)
-
-
-def _low_passed(previous: float, x: float, h: float) -> float:
-    return previous + h / (FILTER_TIME + h) * (x - previous)

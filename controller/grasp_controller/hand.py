@@ -203,9 +203,9 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     )
 
 
-def published_forces(p: Params, x: State, u: Inputs) -> PerFinger:
-    """u_k in N by Eq. (7N), whatever the grip force is."""
-    return layer_forces(p, _virtual(p, x, u), u)
+def published_squeeze(p: Params, x: State, u: Inputs) -> float:
+    """The mean of -u_k in N by Eq. (7N), whatever the grip force is."""
+    return _squeeze(layer_forces(p, _virtual(p, x, u), u))
 
 
 def layer_forces(p: Params, virtual: Motions, u: Inputs) -> PerFinger:
@@ -248,7 +248,7 @@ def _gripped(p: Params, x: State, u: Inputs, h: float) -> tuple[grip.State, PerF
     all_quiet = 1.0
     for rate in rates:
         all_quiet = all_quiet * grip.quiet(rate)
-    squeeze, brake = _squeeze(published_forces(p, x, u)), _brake(p, u)
+    squeeze, brake = published_squeeze(p, x, u), _brake(p, u)
     pressed = squeeze + brake + grip.change(force, squeeze, brake, x.grip.share)
     closing = 2.0 * weighted_mean(p.weight, u.velocity)
     return grip.advance(x.grip, pressed, closing, all_quiet, h), rates

@@ -165,14 +165,11 @@ def initial_state(p: Params, u: Inputs) -> State:
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance the virtual objects by h seconds (h > 0), the samples u held, and learn from them."""
-    rate, squeeze = 0.0, 0.0
-    forces = hand.published_forces(p, x.layers, u)
-    for s_dot, force in zip(u.velocity, forces, strict=True):
+    rate = 0.0
+    for s_dot in u.velocity:
         rate = rate + s_dot
-        squeeze = squeeze - force
-    fingers = float(FINGERS)
-    closing = holding.filtered(p.hold, x.closing, 2.0 * rate / fingers, h)
-    pressed = holding.pressed(p.hold, squeeze / fingers, closing)
+    closing = holding.filtered(p.hold, x.closing, 2.0 * rate / float(FINGERS), h)
+    pressed = holding.pressed(p.hold, hand.published_squeeze(p, x.layers, u), closing)
     lasting = holding.lasting(p.hold, x.lasting, pressed, h)
     hold = pressed
     for eye, line in zip(p.sensors, x.lines, strict=True):
@@ -262,14 +259,13 @@ def squares(lines: Lines, logs: PerFinger) -> float:
 
 def gain(p: Reflectance, line: Line) -> float:
     """g_k: how far noise lets a line be believed, from 0 without a slope to 1."""
-    v = _prior(p)
-    return v / (v + line.noise_variance) if v > 0.0 else 0.0  # g_k of (R7)
+    return reflectance_ratio.believed(_prior(p), line.noise_variance)  # g_k of (R7)
 
 
 def deviation(p: Reflectance, line: Line, full: float, share: float) -> float:
     """The standard deviation of ln alpha_k to the mean that is left, b_k being share·full."""
     v = _prior(p)
-    known = v / (v + line.brightness_variance) if v > 0.0 else 0.0
+    known = reflectance_ratio.believed(v, line.brightness_variance)
     missed = (1.0 - share) * known * full
     return sqrt(v * (1.0 - known) + missed * missed)
 

@@ -14,6 +14,7 @@ from typing import Annotated
 from block_variables import Group, Output, Parameter
 
 from . import reflectance_ratio
+from .low_pass import low_passed
 from .reflectance_ratio import Learning, Line, Sensor
 
 Hold = Annotated[
@@ -73,12 +74,12 @@ class Params(Group, name="hold"):
 
 def filtered(p: Params, previous: float, closing: float, h: float) -> float:
     """The low-passed speed of closing in m/s, h seconds later."""
-    return _low_passed(previous, closing, p.time_constant, h)
+    return low_passed(previous, closing, p.time_constant, h)
 
 
 def lasting(p: Params, previous: float, pressed: float, h: float) -> float:
     """p_f h seconds later, `pressed` held."""
-    return _low_passed(previous, pressed, p.blind_time, h)
+    return low_passed(previous, pressed, p.blind_time, h)
 
 
 def pressed(p: Params, squeeze: float, closing: float) -> float:
@@ -111,7 +112,3 @@ def near(p: Params, gap: float) -> float:
     square = ratio * ratio
     fourth = square * square
     return 1.0 / (1.0 + fourth * fourth)  # (R8)
-
-
-def _low_passed(previous: float, x: float, time_constant: float, h: float) -> float:
-    return previous + h / (time_constant + h) * (x - previous)

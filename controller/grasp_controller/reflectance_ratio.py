@@ -388,9 +388,8 @@ def ratio(p: Params, eyes: Sensors, line_1: Line, line_2: Line) -> Estimate:
     )
     within = _clamped(fitted, -p.limit, p.limit)
     share = evidence(p, within * within / max(line_1.variance + line_2.variance, TINY))
-    noise_variance = line_1.noise_variance + line_2.noise_variance
-    beta = share * prior / (prior + noise_variance) * within  # (R4)
-    gain = prior / (prior + (line_1.brightness_variance + line_2.brightness_variance))
+    beta = share * believed(prior, line_1.noise_variance + line_2.noise_variance) * within  # (R4)
+    gain = believed(prior, line_1.brightness_variance + line_2.brightness_variance)
     missed = (1.0 - share) * gain * within
     spread = prior * (1.0 - gain) + missed * missed
     return Estimate(beta, sqrt(spread), exp(-abs(beta)))
@@ -469,8 +468,12 @@ def gap(p: Learning, eye: Sensor, line: Line) -> float:
 
 def known(p: Learning, line: Line) -> float:
     """How far the slope of a line is known from noise, from 0 without one to 1."""
-    prior = p.prior_deviation * p.prior_deviation
-    return prior / (prior + line.noise_variance) if prior > 0.0 else 0.0
+    return believed(p.prior_deviation * p.prior_deviation, line.noise_variance)
+
+
+def believed(prior: float, variance: float) -> float:
+    """How far an estimate of that variance counts against a prior of variance `prior`, 0 to 1."""
+    return prior / (prior + variance) if prior > 0.0 else 0.0
 
 
 def _clamped(x: float, low: float, high: float) -> float:

@@ -114,12 +114,14 @@ def of_fingers(
 class FirstContact(NamedTuple):
     """When a finger first touches in s, and how fast its gap closes then in m/s.
 
-    `row` is the first row in which it touches. There is no speed without a gap.
+    `row` is the first row in which it touches. There is no speed without a gap. `of_plant` is true
+    where the plant tells them.
     """
 
     time: float
     speed: float | None
     row: int
+    of_plant: bool = False
 
 
 FROM_CONTACT: Mapping[str, Any] = {"needs": TOUCH, "uses": CONTACT_SIGNALS}
@@ -213,9 +215,10 @@ def impact_impulse(signals: Signals, finger: int) -> float | None:
     None if the run ends sooner. The trapezoids begin with the force of the first sample, as one
     that begins with a jump has it. They need two samples.
     """
+    contact = first_contact(signals, finger)
     times, force = since_contact(signals, finger)
     of_plant = f"plant.impact_impulse[{finger}]"
-    if of_plant in signals and _contact_of_plant(signals, finger):
+    if contact and contact.of_plant and of_plant in signals:
         return abs(float(signals[of_plant][-1])) if times[-1] >= IMPACT_WINDOW else None
     if np.count_nonzero(times <= IMPACT_WINDOW) < 2 or times[-1] < IMPACT_WINDOW:
         return None
@@ -556,7 +559,7 @@ def _contact_of_plant(signals: Signals, finger: int) -> FirstContact | None:
     earliest = time[last_step[1] if last_step else 0]
     if not earliest - SAME_MOMENT <= moment <= time[row] + SAME_MOMENT:
         return None
-    return FirstContact(moment, float(speed[row]), row)
+    return FirstContact(moment, float(speed[row]), row, of_plant=True)
 
 
 def _closing_speed(signals: Signals, finger: int, k: int) -> float:
