@@ -388,8 +388,10 @@ def ratio(p: Params, eyes: Sensors, line_1: Line, line_2: Line) -> Estimate:
     )
     within = _clamped(fitted, -p.limit, p.limit)
     share = evidence(p, within * within / max(line_1.variance + line_2.variance, TINY))
-    beta = share * believed(prior, line_1.noise_variance + line_2.noise_variance) * within  # (R4)
-    gain = believed(prior, line_1.brightness_variance + line_2.brightness_variance)
+    noise_variance = line_1.noise_variance + line_2.noise_variance
+    beta = share * believed(prior, noise_variance) * within  # (R4)
+    brightness_variance = line_1.brightness_variance + line_2.brightness_variance
+    gain = believed(prior, brightness_variance)
     missed = (1.0 - share) * gain * within
     spread = prior * (1.0 - gain) + missed * missed
     return Estimate(beta, sqrt(spread), exp(-abs(beta)))
