@@ -134,7 +134,7 @@ def _results(
 ) -> Generator[tuple[int, Result | None], None, None]:
     """What run(*shared, job) returns, by the number of the job, as they end; None of a lost one.
 
-    Closing it cancels the rest.
+    Those found ended at the same time come in their order. Closing it cancels the rest.
     """
     remaining = iter(jobs)
     pending: dict[Future[Result], int] = {}
@@ -144,7 +144,8 @@ def _results(
                 pending[executor.submit(run, *shared, job)] = job[0]
             if not pending:
                 break
-            for future in wait(pending, return_when=FIRST_COMPLETED).done:
+            ended = wait(pending, return_when=FIRST_COMPLETED).done
+            for future in sorted(ended, key=pending.__getitem__):
                 index, failure = pending.pop(future), future.exception()
                 if failure is None:
                     yield index, future.result()
