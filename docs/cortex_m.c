@@ -154,6 +154,53 @@ static void measure_keyed_step(const GraspController_Parameters *p, GraspControl
 }
 #endif
 
+#ifdef WITH_XCP
+#include "GraspController_xcp.h"
+
+/* A session with a master of XCP whose datagrams are made here: what the event costs in which six
+ * doubles are measured. The memory is global: a2ltool finds its address in the ELF file.
+ */
+GraspController_Memory GraspController_memory = GRASPCONTROLLER_MEMORY_DEFAULTS;
+static xcp slave;
+static uint32_t sent;
+
+static void send_to_master(void *context, const uint8_t *datagram, size_t size)
+{
+    (void)context, (void)datagram; /* Here: to the network */
+    sent += size;
+}
+
+static void command(uint8_t code, uint8_t a, uint8_t b, uint8_t c, uint32_t last)
+{
+    uint8_t message[XCP_ANSWER_SIZE] = {8, 0, 0, 0, code, a, b, c}, answer_to_it[XCP_ANSWER_SIZE];
+    xcp_put(message + 8, last, 4);
+    if (!xcp_receive(&slave, message, 12, 0, answer_to_it) || answer_to_it[4] != XCP_OK)
+        fail("XCP refuses ", code);
+}
+
+static void measure_xcp(void)
+{
+    GraspController_Memory *m = &GraspController_memory;
+    uint32_t address = (uint32_t)(uintptr_t)m, before, i;
+    GraspController_xcp_init(&slave, m, address);
+    command(0xFF, 0, 0, 0, 0);
+    command(0xD6, 0, 0, 0, 0);
+    command(0xD5, 0, 1, 0, 0); /* a list */
+    command(0xD4, 0, 0, 0, 1); /* a message */
+    command(0xD3, 0, 0, 0, 6 << 8);
+    command(0xE2, 0, 0, 0, 0);
+    for (i = 0; i < 6; i++)
+        command(0xE1, 0xFF, 8, 0, address + offsetof(GraspController_Memory, outputs) + 8 * i);
+    command(0xE0, 0x10, 0, 0, 1 << 16);
+    command(0xDE, 1, 0, 0, 0);
+    before = TIMER[2];
+    xcp_event(&slave, 1, send_to_master, NULL);
+    say("ticks of a DAQ event: ", ticks_since(before));
+    say("bytes that it sends: ", sent);
+    say("bytes of memory for XCP: ", sizeof slave + sizeof *m);
+}
+#endif
+
 int main(void)
 {
     static const GraspController_Parameters p = GRASPCONTROLLER_PARAMETERS_DEFAULTS;
@@ -190,6 +237,9 @@ int main(void)
     measure_refusal(&p, u, &x);
 #ifdef WITH_LINK
     measure_keyed_step(&p, &x);
+#endif
+#ifdef WITH_XCP
+    measure_xcp();
 #endif
     semihosting(0x18, 0x20026);
 }

@@ -43,6 +43,11 @@ target_option = click.option(
     metavar="DIR",
     help="Write only the C code of the blocks to a folder, for real-time platforms.",
 )
+@click.option(
+    "--a2l",
+    is_flag=True,
+    help="With --c-only: write an A2L file and an XCP slave, too, for calibration tools.",
+)
 @json_option
 def build(
     block: Path | None,
@@ -52,6 +57,7 @@ def build(
     fmi: str | None,
     fingers: int | None,
     c_only: Path | None,
+    a2l: bool,
     as_json: bool,
 ) -> int:
     """Build the FMUs of the blocks, in Python or in C.
@@ -79,6 +85,8 @@ def build(
     for option, value in only_native.items():
         if value is not None and not native:
             raise InputError(f"{option} {value}: needs --native")
+    if a2l and not c_only:
+        raise InputError("--a2l: needs --native --c-only DIR")
     if block:
         check_nature(block, "block")
     folder = out or (NATIVE_FOLDER if native else FMU_FOLDER)
@@ -88,7 +96,7 @@ def build(
         if c_only:
             if target or fmi or out or fingers:
                 raise ValueError("--c-only cannot be used with --target, --fmi, --fingers or --out")
-            files = [str(path) for path in write_c_only(block, c_only)]
+            files = [str(path) for path in write_c_only(block, c_only, a2l)]
             show(as_json, {"files": files}, "\n".join(f"{file}: written" for file in files))
             return 0
         if fingers is not None and block:

@@ -167,10 +167,10 @@ def names_ours(block: Path) -> bool:
     return block.suffix == "" and block.name == str(block) and not block.exists()
 
 
-def write_c_only(block: Path | None, out: Path) -> list[Path]:
+def write_c_only(block: Path | None, out: Path, a2l: bool = False) -> list[Path]:
     """Write the C of one block into the folder `out`, of all into folders in it.
 
-    block is as in build_chosen(); return the files. ValueError, one line, where there is none.
+    With `a2l` what measures and calibrates them by XCP comes along. block is as in build_chosen(); return the files. ValueError, one line, where there is none.
     """
     from .native.c_only import write_c
     from .own_block import own_model
@@ -178,10 +178,10 @@ def write_c_only(block: Path | None, out: Path) -> list[Path]:
 
     if block and not names_ours(block):
         with own_model(block) as model:
-            return write_c(out, model)
+            return write_c(out, model, a2l)
     names = chosen_names([str(block)] if block else [])
     places = [(shipped_model(name), out if block else out / name) for name in names]
-    return [path for model, place in places for path in write_c(place, model)]
+    return [path for model, place in places for path in write_c(place, model, a2l)]
 
 
 def build_model(model: Model, out: Path, plan: Plan | None = None) -> Built:

@@ -14,6 +14,7 @@ from ...base.c_compilers import BITS, LIBM
 from ..contract import Scalar, Variable
 from ..link import ORDER, Causality, Kind, LinkVariable, Signature, Value
 from ..package import Model, write_file
+from .a2l import a2l_texts, layout, xcp_texts
 from .bench_header import Group, lines_of, members, structs
 from .blocks import translated
 from .text import comment_text
@@ -21,6 +22,8 @@ from .text import comment_text
 FOLDER = Path(__file__).parent
 HELPERS = ("arithmetic.h", "variable.h")
 """What the C of a block includes, from the folder c."""
+XCP_HELPERS = ("xcp.h", "xcp_udp.h")
+"""What its side of XCP includes, and the example for that."""
 
 EXACT = {"ceil": "ceiled", "copysign": "copysign", "fabs": "fabs", "floor": "floored"}
 EXACT |= {"sqrt": "sqrt", "trunc": "truncated", "ldexp": "scaled"}
@@ -39,14 +42,21 @@ _TEMPLATES = {
     "main.c": "c_only_main.c.in",
 }
 """The files that are made from a template, with the name of the block for NAME."""
+_XCP_TEMPLATES = {
+    "NAME.a2l": "c_only.a2l.in",
+    "NAME_xcp.h": "c_only_xcp.h.in",
+    "xcp_main.c": "c_only_xcp_main.c.in",
+}
+"""Those for a master of XCP."""
 _KINDS: dict[type[Scalar], Kind] = {float: "Real", int: "Integer", bool: "Boolean"}
 
 
-def c_only(model: Model) -> dict[str, bytes]:
+def c_only(model: Model, a2l: bool = False) -> dict[str, bytes]:
     """Return the files of a single block in C, by name.
 
     NAME.h and NAME.c; NAME_text.c, with the words for why something is refused; main.c, an
-    example; and what they include.
+    example; and what they include. With `a2l` also NAME.a2l, NAME_xcp.h and xcp_main.c,
+    by which a master of XCP measures and calibrates the block.
 
     UntranslatableError, one line, where the block holds what cannot be translated.
     """
@@ -66,9 +76,15 @@ def c_only(model: Model) -> dict[str, bytes]:
         **_example(name, libm, groups[-1]),
     }
     files = {"block.h": block}
-    for file in HELPERS:
+    helpers, templates = [*HELPERS], {**_TEMPLATES}
+    if a2l:
+        memory = layout(groups, variables, int(texts["state_size"]))
+        texts |= xcp_texts(name, memory) | a2l_texts(name, model.description.summary, memory)
+        helpers += XCP_HELPERS
+        templates |= _XCP_TEMPLATES
+    for file in helpers:
         files[file] = (FOLDER / "c" / file).read_text("utf-8")
-    for file, template in _TEMPLATES.items():
+    for file, template in templates.items():
         files[file.replace("NAME", name)] = _filled(FOLDER / template, texts)
     return {file: text.encode() for file, text in files.items()}
 
@@ -107,15 +123,20 @@ def _example(name: str, libm: Sequence[str], outputs: Group) -> dict[str, str]:
     """Return what main.c has of a block, by placeholder: the command for it, and what it prints."""
     flags = [*BITS, *(f"-fno-builtin-{function}" for function in libm if function in LIBM)]
     return {
-        "command": f"cc {' '.join(flags)} -o {name} main.c {name}.c {name}_text.c -lm",
+        "command": _command(flags, name, "main.c", name),
+        "xcp_command": _command(flags, f"xcp_{name}", "xcp_main.c", name),
         "format": " %.17g" * len(outputs.members),
         "arguments": "".join(f", (double)y->{member}" for _, member in outputs.members),
     }
 
 
-def write_c(folder: Path, model: Model) -> list[Path]:
+def _command(flags: Sequence[str], program: str, main: str, name: str) -> str:
+    return f"cc {' '.join(flags)} -o {program} {main} {name}.c {name}_text.c -lm"
+
+
+def write_c(folder: Path, model: Model, a2l: bool = False) -> list[Path]:
     """Write the files of c_only() into a folder; return them."""
-    files = {folder / name: data for name, data in sorted(c_only(model).items())}
+    files = {folder / name: data for name, data in sorted(c_only(model, a2l).items())}
     for path, data in files.items():
         write_file(path, data)
     return [*files]
