@@ -17,6 +17,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import calibration_picture
 import delicate_picture
 import numpy as np
 import tutorials
@@ -183,6 +184,7 @@ PICTURES: Mapping[str, tuple[Callable[[Path], None], Sequence[str]]] = {
     "evaluation": (draw_evaluation, ["contact_times.png", "contact_forces.png"]),
     "report": (draw_report, ["report.png"]),
     "timing": (draw_timing, ["timing.png"]),
+    "calibration": (calibration_picture.draw, ["calibration.png"]),
     "sweep": (draw_sweep_of_widths, ["sweep.png"]),
     "maps": (draw_map, ["reflectance_map.png"]),
     "layer_2": (draw_layer_2, ["layer_2_loop.png"]),

@@ -24,7 +24,7 @@ class RefusedError(Exception):
 
 
 class XcpMaster:
-    """Sends commands to a UDP port; keeps the messages with measured values, and what is missing."""
+    """Sends commands to a UDP port; keeps messages with measured values, and how many lack."""
 
     def __init__(self, port):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -82,7 +82,7 @@ class XcpMaster:
         self(0xF0, len(data), data=data)
 
     def measure(self, *lists, prescaler=1):
-        """Begin to measure: of each list the ODTs, of each of these (address, size) of its entries."""
+        """Begin to measure: of each list the ODTs, of each of these the (address, size)."""
         self(0xD6)
         self(0xD5, 0, len(lists), 0)
         for number, odts in enumerate(lists):

@@ -170,7 +170,8 @@ def names_ours(block: Path) -> bool:
 def write_c_only(block: Path | None, out: Path, a2l: bool = False) -> list[Path]:
     """Write the C of one block into the folder `out`, of all into folders in it.
 
-    With `a2l` what measures and calibrates them by XCP comes along. block is as in build_chosen(); return the files. ValueError, one line, where there is none.
+    With `a2l` what measures and calibrates them by XCP comes along. block is as in build_chosen();
+    return the files. ValueError, one line, where there is none.
     """
     from .native.c_only import write_c
     from .own_block import own_model

@@ -4,6 +4,7 @@ import re
 import shlex
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,8 @@ COMMANDS = [command for command, _ in SHOWN]
 (COMPILE,) = (c for c in COMMANDS if c.startswith("arm-none-eabi-gcc"))
 LINKED = f"{COMPILE} -DWITH_LINK"
 """The same with a session of the link."""
+CALIBRATED = f"{COMPILE} -g -DWITH_XCP"
+"""The same with a session of XCP."""
 LOAD = PAGE.partition("## Measured load\n")[2].partition("\n## ")[0]
 TABLE = [line.split(" | ") for line in re.findall(r"^\|(.*) \|$", LOAD, re.MULTILINE)]
 ADAPTIVE = {
@@ -71,7 +74,7 @@ def test_the_figures_of_the_page(checkout, controller):
     source = (ROOT / "docs/cortex_m.c").read_text("utf-8")
     (checkout / "cortex_m.c").write_text(replaced(source, words), "utf-8")
     *before, compiled, size, emulated = [replaced(command, words) for command in COMMANDS]
-    linked = replaced(LINKED, words)
+    linked, calibrated = replaced(LINKED, words), replaced(CALIBRATED, words)
     for command in before:
         run(command)
     for core, other in ("M4F", {}), ("M7", M7):
@@ -90,6 +93,10 @@ def test_the_figures_of_the_page(checkout, controller):
         assert difference < 1e-12
         assert run(replaced(linked, other)) == ""
         image |= said(run(replaced(emulated, other)))
+        assert run(replaced(calibrated, other)) == ""
+        image |= said(run(replaced(emulated, other)))
+        assert image["bytes that it sends"] == 4 + 1 + 4 + 6 * 8
+        assert image["bytes of memory for XCP"] < 3000
         assert image["bytes of its answer"] > 80 + 32
         column = TABLE[0].index(f"Cortex-{core}, {controller}")
         page = [float(row[column].replace(",", "")) for row in TABLE[1:]]
@@ -98,12 +105,35 @@ def test_the_figures_of_the_page(checkout, controller):
             image["ticks of the longest"] * TICK,
             image["ticks of a refusal"] * TICK,
             image["ticks of a keyed STEP"] * TICK,
+            image["ticks of a DAQ event"] * TICK,
+            image["bytes of memory for XCP"],
             image["bytes of stack with it"],
             int(bytes_of[".data"]) + int(bytes_of[".bss"]),
             int(bytes_of[".text"]),
         ]
         assert found == pytest.approx(page[:-1], rel=0.1)
         assert difference == pytest.approx(page[-1], rel=0.1, abs=1e-18)
+
+
+def test_a2ltool_finds_the_memory_in_the_image(rows):
+    """And puts the addresses of its members in the place of those on a host."""
+    a2ltool = Path(sys.executable).with_name("a2ltool")
+    if not a2ltool.exists():
+        pytest.skip("NO a2ltool")
+    said_of(rows)  # which writes the record
+    run(CALIBRATED)
+    before = Path("controller_c/GraspController.a2l").read_text("ascii")
+    options = "--elffile controller.elf --update ADDRESSES --strict -o target.a2l"
+    run(f"{a2ltool} controller_c/GraspController.a2l {options}")
+    symbols = run("arm-none-eabi-nm controller.elf")
+    [memory] = re.findall(r"^(\w+) \w GraspController_memory$", symbols, re.MULTILINE)
+    place = r"(?:VALUE|ECU_ADDRESS) (0x\w+)"
+    old, new = (
+        [int(at, 16) for at in re.findall(place, text)]
+        for text in (before, Path("target.a2l").read_text("ascii"))
+    )
+    assert len(old) == len(new) > 30
+    assert {b - a for a, b in zip(old, new, strict=True)} == {int(memory, 16) - old[0]}
 
 
 @pytest.fixture

@@ -90,7 +90,7 @@ def outputs_of(block, p, step):
 
 @pytest.mark.parametrize("name", [TRANSLATED[0], *map(slow, TRANSLATED[1:])])
 def test_what_the_a2l_file_names_is_at_its_place(name, written):
-    """Parameters and inputs are at their start values; outputs of one step are those of the block."""
+    """Parameters and inputs at their start values; outputs of one step are those of the block."""
     folder = written(name)
     model = shipped_model(name)
     fields = declared(model.block)

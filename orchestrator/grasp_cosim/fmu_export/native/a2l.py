@@ -1,18 +1,18 @@
 """Writes what measures and calibrates the C of a block: an A2L file, and its side of XCP.
 
-c_only.a2l.in is the file, ASAM MCD-2 MC 1.7.1, and c_only_xcp.h.in what the slave of c/xcp.h takes of
-a block. Both are made of its declarations: units, ranges, meanings, and groups by the part of a name
-before its dot, which are the layers of the controllers.
+c_only.a2l.in is the file, ASAM MCD-2 MC 1.7.1, and c_only_xcp.h.in what the slave of c/xcp.h takes
+of a block. Both are made of its declarations: units, ranges, meanings, and groups by the part of a
+name before its dot, which are the layers of the controllers.
 """
 
 import re
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from hashlib import sha256
 from typing import NamedTuple
 
 from ..contract import Enumeration, Variable
-from ..link import Kind
+from ..link import Causality, Kind
 from .bench_header import Group
 from .text import UntranslatableError, comment_text
 
@@ -34,7 +34,7 @@ _RANGES: dict[Kind, tuple[float, float]] = {
     "Integer": (-(2**31), 2**31 - 1),
     "Boolean": (0, 1),
 }
-_IN_MEMORY = ("parameter", "input", "output")
+_IN_MEMORY: tuple[Causality, ...] = ("parameter", "input", "output")
 """The structs in the memory, in their order; the state is the last one."""
 
 
@@ -61,7 +61,9 @@ def layout(groups: Sequence[Group], variables: Sequence[Variable], state_size: i
     """Lay out the structs of a block: parameters, inputs, outputs, then its state."""
     by_name = {v.name: v for v in variables}
     by_causality = {group.causality: group for group in groups}
-    places, offsets, at = [], {}, 0
+    places: list[Place] = []
+    offsets: dict[str, int] = {}
+    at = 0
     for causality in _IN_MEMORY:
         offsets[causality] = at
         alignment = 1
@@ -124,7 +126,7 @@ def _is_tunable(variable: Variable) -> bool:
     return variable.variability == "tunable"
 
 
-def a2l_texts(name: str, summary: str, memory: Layout) -> Mapping[str, str]:
+def a2l_texts(name: str, summary: str, memory: Layout) -> dict[str, str]:
     """Return what the A2L file of a block consists of, by placeholder of its template."""
     parameters = [p for p in memory.places if p.variable.causality == "parameter"]
     measured = [p for p in memory.places if p.variable.causality != "parameter"]
@@ -167,9 +169,7 @@ def _words(name: str, items: Sequence[tuple[str, int]]) -> Iterator[str]:
         f'    /begin COMPU_METHOD {name} "" TAB_VERB "%.0" "" COMPU_TAB_REF {name}.words '
         "/end COMPU_METHOD"
     )
-    yield (
-        f'    /begin COMPU_VTAB {name}.words "" TAB_VERB {len(items)} {values} /end COMPU_VTAB'
-    )
+    yield (f'    /begin COMPU_VTAB {name}.words "" TAB_VERB {len(items)} {values} /end COMPU_VTAB')
 
 
 def _conversion_of_unit(unit: str) -> str:
