@@ -168,7 +168,7 @@ def test_an_array_stands_for_its_elements(tmp_path):
 
 
 def test_a_list_of_a_command_line_has_commas_but_in_brackets():
-    listed = Record.from_texts(["b.y, a.A[1,2],a.f(x,y)", "!c.*"])
+    listed = Record().with_texts(["b.y, a.A[1,2],a.f(x,y)", "!c.*"])
     assert listed.signals == ("b.y", "a.A[1,2]", "a.f(x,y)", "!c.*")
 
 

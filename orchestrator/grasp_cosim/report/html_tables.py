@@ -19,6 +19,9 @@ EXPERIMENT = (
 )  # fmt: skip
 """Entries of run.json that say how the run was made, in the order in which they are shown."""
 
+PAGE = "report.html"
+"""The page of a run, in its folder."""
+
 _EXPERIMENT_UNITS = {"step": "s", "stop": "s", "wall_time": "s"}
 
 
@@ -143,6 +146,19 @@ def _experiment_html(run: Mapping[str, Any], origin: Mapping[str, Any]) -> str:
     ]
     rows += [cell(key) + cell(text) for key, text in origin_rows(origin)]
     return table("", rows)
+
+
+def windows_html(result: Result) -> str:
+    """A row for each window of a triggered run: when its trigger came true, and what it has."""
+    rows = []
+    for window in (part.summary for part in result.windows):
+        times = [number(window[key]) for key in ("time", "from", "until")]
+        cells = [window["folder"], *times, grouped(window["rows"])]
+        rows.append("".join(map(cell, cells)))
+    condition = escape(result.settings["trigger"]["when"])
+    hint = f'<p class="hint">In windows around the points at which {condition} became true.</p>'
+    heads = "<th>folder</th><th>trigger in s</th><th>from</th><th>until</th><th>rows</th>"
+    return table(heads, rows) + hint
 
 
 def protocol_html(result: Result) -> str:

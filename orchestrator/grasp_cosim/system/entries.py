@@ -15,7 +15,7 @@ from ..base.checks import check_keys, choice, text
 from ..base.errors import InputError
 from ..interface.read import read_interface
 from .changes import replaced, with_old_values, with_values
-from .overrides import ENTRIES_OF_SECTIONS, ComponentOverrides, Override
+from .overrides import ENTRIES_OF_SECTIONS, RECORD, ComponentOverrides, Override
 from .parts import (
     ISOLATIONS,
     Acceptance,
@@ -25,9 +25,11 @@ from .parts import (
     Realtime,
     Solver,
 )
+from .record import Record, Trigger
+from .scenario import read_condition
 from .stimuli import INTERPOLATIONS, Stimuli, read_stimuli
 from .structure import DIVERGING, SCHEMES, Structure
-from .times import LONGEST, in_nanoseconds
+from .times import LONGEST, Time, in_nanoseconds
 
 Options = TypeVar("Options")
 
@@ -76,6 +78,7 @@ def sections(
     pace = system.realtime if system else Realtime()
     verdict = system.verdict if system else Acceptance()
     stimuli = system.input if system else None
+    record = system.record if system else Record()
     return {
         **experiment(tables["experiment"].values()),
         "initialisation": _with_options("initialisation", loops, tables["initialisation"]),
@@ -83,7 +86,34 @@ def sections(
         "verdict": _with_options("verdict", verdict, tables["verdict"]),
         "roles": roles,
         "input": _with_input(stimuli, tables["input"], folder),
+        "record": with_trigger(record, tables[RECORD]),
     }
+
+
+def with_trigger(record: Record, overrides: Mapping[str, Override]) -> Record:
+    """The record with another trigger, or other times of it: overrides of "trigger", "before" and
+    "after". An empty trigger takes it away.
+    """
+    trigger, times = record.trigger, dict(overrides)
+    when = trigger.when if trigger else None
+    if override := times.pop("trigger", None):
+        when = read_condition(override.label, override.value) if override.value != "" else None
+    if when is None:
+        for override in times.values():
+            raise InputError(
+                f"{override.label} = {override.value!r}: there is no trigger; must have one, like "
+                'record.trigger = "plant.contact[1] == true"'
+            )
+        return record.untriggered()
+    spans: dict[str, Time] = {"before": 0}
+    if trigger:
+        spans = {"before": trigger.before_ns, "after": trigger.after_ns}
+    for entry, override in times.items():
+        spans[entry] = in_nanoseconds(override.label, override.value, zero=True)
+    if "after" not in spans:
+        label = next(iter(overrides.values())).label_of("record.after")
+        raise InputError(f"{label}: no entry; a trigger must have one, a time in s, at least 0")
+    return replace(record, trigger=Trigger(when, spans["before"], spans["after"]))
 
 
 def _with_input(

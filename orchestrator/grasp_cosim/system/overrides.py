@@ -24,8 +24,8 @@ SECTIONS = (
 )  # fmt: skip
 """The entries of a system file, which are no names of components."""
 
-RECORD = "record"
-"""Another entry: a list only, which no --set changes, so a component may have its name."""
+RECORD, SIGNALS = "record", "signals"
+"""Another entry, and the list in it, which no --set changes. A component may have its name."""
 
 ENTRIES_OF_SECTIONS: Mapping[str, Sequence[str]] = {
     "experiment": ("step", "stop", "scheme", "diverging", "start", "variant"),
@@ -35,6 +35,7 @@ ENTRIES_OF_SECTIONS: Mapping[str, Sequence[str]] = {
     "realtime": Realtime.__slots__,
     "verdict": Acceptance.__slots__,
     "input": ("file", "interpolation"),
+    RECORD: ("trigger", "before", "after"),
 }
 """The sections that have single values, each with its entries, where these are always the same."""
 
@@ -184,7 +185,7 @@ def parse_place(components: Collection[str], text: str, label: str) -> Place:
     section, _, path = text.partition(".")
     if section in components:
         section, path = "components", f"{section}.values.{path}"
-    if section == RECORD:
+    if section == RECORD and path == SIGNALS:
         raise InputError(f"{label}: is a list; must be given by --record, or with_record()")
     known(f"{label}: no component", section, [*components, *ENTRIES_OF_SECTIONS])
     if section != "components":

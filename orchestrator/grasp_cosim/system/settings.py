@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from .parts import Acceptance, Component, Realtime
-from .scenario import event_entry, fault_entry, limit_entry
+from .scenario import event_entry, fault_entry, limit_entry, trigger_entry
 from .stimuli import input_entry
 from .structure import Structure
 from .times import in_seconds
@@ -35,6 +35,8 @@ def settings(system: Structure) -> dict[str, Any]:
     entries["metrics"] = list(system.metrics)
     if system.record.signals:
         entries["record"] = list(system.record.signals)
+    if system.record.trigger:
+        entries["trigger"] = trigger_entry(system.record.trigger)
     entries["roles"] = dict(system.roles)
     entries["connections"] = [
         {"from": str(c.source), "to": str(c.target), "factor": c.factor, "offset": c.offset}
