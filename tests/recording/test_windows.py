@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -26,8 +27,8 @@ STEP = 0.125
 class Pulses:
     """Puts out whether the time is in one of its pulses, and a count of its steps."""
 
-    outputs = {"on": (False, None), "count": (0, None), "wave": (0.0, "m")}
-    high = ()
+    outputs: ClassVar = {"on": (False, None), "count": (0, None), "wave": (0.0, "m")}
+    high = frozenset()
 
     def __init__(self):
         self.count = 0
@@ -302,9 +303,9 @@ def test_a_window_that_is_gone_is_named(grasp, tmp_path):
 def test_a_window_whose_file_cannot_be_made_breaks_the_run(grasp, tmp_path):
     (tmp_path / "window_001").write_text("in the way")
     system = contact(grasp, after=0.1)
-    with RunFolder(tmp_path, system) as folder:
-        with pytest.raises(SimulationError, match="window_001: cannot be written"):
-            simulate(system, listeners=[folder])
+    refusal = pytest.raises(SimulationError, match="window_001: cannot be written")
+    with RunFolder(tmp_path, system) as folder, refusal:
+        simulate(system, listeners=[folder])
     assert not json.loads((tmp_path / "run.json").read_text())["complete"]
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..base.checks import known
 from ..exchange.bounds import Bounds
 from ..exchange.dispatch import Dispatcher
 from ..exchange.listener import Listener, Signal, Texts, Window
@@ -46,6 +47,7 @@ class RunRecord:
         self._all_metrics = metrics_of(system.metrics, self.metrics)
         self.group_notes = check_groups(system)
         """Lines for the log on groups of metrics of the system that are not available."""
+        _check_limits(system, self._all_metrics)
         self._in_si = in_si(system, self._all_metrics)
         self.is_triggered = system.record.trigger is not None
         """True if only windows around a trigger are recorded."""
@@ -178,3 +180,11 @@ class RunRecord:
         """A line for the log on a trigger that never came true."""
         trigger = self.dispatcher.trigger
         return [*trigger.absence] if trigger else []
+
+
+def _check_limits(system: System, metrics: Sequence[Metric]) -> None:
+    """InputError at the first limit of [verdict.metrics] for a metric that there is not."""
+    sized = [m.of(system.observed_names, system.roles) for m in metrics]
+    names = [name for m in sized for name in dict.fromkeys((m.name, *m.columns))]
+    for limit in system.verdict.metrics:
+        known(f"{system.name}: verdict.metrics: no metric", limit.name, names)

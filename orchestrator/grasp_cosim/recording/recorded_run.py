@@ -24,7 +24,7 @@ from ..system.parts import Component
 from ..system.settings import given_values
 from ..system.times import NANOSECONDS, nearest_time
 from .proxies import proxy_figures
-from .verdict import Criterion, judge
+from .verdict import Verdict, judge
 
 KINDS = {"f": "Real", "i": "Integer", "b": "Boolean", "O": "String"}
 """The kind of a signal by the kind of its column's element type."""
@@ -280,12 +280,12 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
         return figures
 
     @cached_property
-    def verdict(self) -> tuple[Criterion, ...]:
-        """The criteria of a run with a bench, in real time or with limits; none of any other, nor
-        of a window.
+    def verdict(self) -> Verdict:
+        """The criteria of a run with a bench, in real time, with limits, or with limits of its
+        metrics; none of any other, nor of a window. It prints as those that failed.
         """
         if self.window:
-            return ()
+            return Verdict()
         has_steps = len(self.time) or self.steps_done
         return judge(
             self.settings,
@@ -295,6 +295,8 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
             len(self.limits),
             len(self.initialised_anew),
             self.came_to_its_end,
+            self.measured.columns(),
+            self.measured.units,
         )
 
     @property

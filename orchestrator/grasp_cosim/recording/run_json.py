@@ -161,6 +161,13 @@ class TriggerEntry(TypedDict):
     after: TimeInS
 
 
+class BoundsEntry(TypedDict, total=False):
+    """The limits of a metric: system.parts.MetricLimit."""
+
+    low: Number | None
+    high: Number | None
+
+
 class AcceptanceEntry(TypedDict, total=False):
     """What the run may come to and still pass: system.parts.Acceptance."""
 
@@ -175,6 +182,7 @@ class AcceptanceEntry(TypedDict, total=False):
     refused: Number
     warnings: Number
     unfinished: Number
+    metrics: Mapping[str, BoundsEntry]
 
 
 class Made(TypedDict):

@@ -177,10 +177,13 @@ def _criteria_html(result: Result) -> str:
     rows = []
     for criterion in result.verdict:
         verdict = "pass" if criterion.passed else "fail"
+        measured = "no value"
+        if criterion.measured is not None:
+            measured = f"{number(criterion.measured)} {criterion.unit}"
         rows.append(
             cell(criterion.what)
-            + cell(f"at most {number(criterion.limit)} {criterion.unit}", data_head="limit")
-            + cell(f"{number(criterion.measured)} {criterion.unit}", data_head="measured")
+            + cell(criterion.must, data_head="limit")
+            + cell(measured, data_head="measured")
             + cell(verdict, data_head="verdict", class_=verdict)
         )
     return table("<th>criterion</th><th>limit</th><th>measured</th><th>verdict</th>", rows, "cards")

@@ -47,6 +47,9 @@ ENTRIES_OF_COMPONENT = (
 )
 """The entries of a component, of which some are tables."""
 
+METRICS = "metrics."
+"""What the entries of [verdict.metrics] begin with, behind [verdict]."""
+
 PLACE = "{place}"
 """What stands for the place in the origin of an override."""
 
@@ -190,7 +193,8 @@ def parse_place(components: Collection[str], text: str, label: str) -> Place:
     known(f"{label}: no component", section, [*components, *ENTRIES_OF_SECTIONS])
     if section != "components":
         entries = ENTRIES_OF_SECTIONS[section] or [path]
-        known(f"{label}: no entry", path, entries, f" of [{section}]")
+        if section != "verdict" or not path.startswith(METRICS):
+            known(f"{label}: no entry", path, entries, f" of [{section}]")
         return Place(section, "", path)
     component, _, path = path.partition(".")
     entry, _, name = path.partition(".")

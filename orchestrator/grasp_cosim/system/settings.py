@@ -47,12 +47,19 @@ def settings(system: Structure) -> dict[str, Any]:
     if system.limits:
         entries["limits"] = [limit_entry(limit) for limit in system.limits]
     if system.verdict != Acceptance():
-        entries["acceptance"] = asdict(system.verdict)
+        entries["acceptance"] = _acceptance(system.verdict)
     if system.realtime != Realtime():
         entries["realtime"] = asdict(system.realtime)
     if system.input:
         entries["input"] = input_entry(system.input)
     return entries
+
+
+def _acceptance(verdict: Acceptance) -> dict[str, Any]:
+    """The limits of the verdict, those of metrics by name."""
+    entries = asdict(verdict)
+    metrics = {limit.pop("name"): limit for limit in entries.pop("metrics")}
+    return {**entries, "metrics": metrics} if metrics else entries
 
 
 def _component(component: Component) -> dict[str, Any]:
