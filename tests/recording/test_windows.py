@@ -18,7 +18,7 @@ from grasp_cosim import (
 from grasp_cosim.exchange.trigger import TriggeredRows
 from grasp_cosim.recording.folder import FORMS, RunFolder
 from grasp_cosim.recording.memory import WindowRows
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 STEP = 0.125
@@ -61,7 +61,6 @@ def windows_of(is_on, before, after):
     return windows
 
 
-@settings(deadline=None, max_examples=60)
 @given(st.data())
 def test_windows_are_the_rows_of_a_run_without_a_trigger(data):
     steps = data.draw(st.integers(1, 60))
@@ -86,7 +85,6 @@ def test_windows_are_the_rows_of_a_run_without_a_trigger(data):
     assert result.complete
 
 
-@settings(deadline=None, max_examples=60)
 @given(st.data())
 def test_blocks_of_any_length_come_to_the_same_and_little_is_held(data):
     """No more rows than a window has before its trigger."""

@@ -373,9 +373,14 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
         return {"folder": self.subfolder, **of_window, **rows}
 
     def part(self, window: Window, rows: slice) -> Self:
-        """The result of a window, whose rows are these.
+        """The result of a window. It is complete if the run has not broken off in it.
 
-        It is complete if the run has not broken off in it.
+        Args:
+            window: The window.
+            rows: Where its rows are in those of the run.
+
+        Returns:
+            The rows, and what is known of them.
         """
         when = self.settings["trigger"]["when"]
         return replace(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import operator
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -37,6 +38,9 @@ from .validity import (
     check_steps,
     check_stimuli,
 )
+
+LOGGER = logging.getLogger(__name__)
+"""Gets what a system does without."""
 
 ARCHIVE = ".ssp"
 
@@ -439,15 +443,15 @@ class System(Structure):
         return replace(self, record=record)
 
     def untriggered(self) -> System:
-        """The system that records the whole run, with a note where it had a trigger.
+        """The system that records the whole run; the logger says where it had a trigger.
 
         Returns:
             The changed system, or itself where it has no trigger.
         """
         if self.record.trigger is None:
             return self
-        note = f"{self.name}: record.trigger: left out, as all rows are needed"
-        return replace(self, record=self.record.untriggered(), notes=(*self.notes, note))
+        LOGGER.warning("%s: record.trigger: is left out, as all rows are needed", self.name)
+        return replace(self, record=self.record.untriggered())
 
     def as_steered(self) -> System:
         """The system as a session has it, which by default records all that it may set.

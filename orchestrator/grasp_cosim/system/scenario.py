@@ -202,15 +202,15 @@ def check_scenario(system: Structure) -> None:
             raise InputError(f"{place}: must have either at, a time in s, or when, a condition")
         if not event.set:
             raise InputError(f"{place}: set is empty; valid: {choices(_settable(system))}")
-        _check_condition(system, event.when, place)
+        _check_condition(system, event.when, f"{place}: when")
         for port, value in event.set.items():
             parse_set_values(system, port, value, f"{place}: set.{port}")
     for i, limit in enumerate(system.limits):
-        _check_condition(system, limit.when, f"{system.name}: limits[{i}]")
+        _check_condition(system, limit.when, f"{system.name}: limits[{i}]: when")
     for i, fault in enumerate(system.faults):
         _check_fault(system, fault, f"{system.name}: faults[{i}]")
     if trigger := system.record.trigger:
-        _check_condition(system, trigger.when, f"{system.name}: record", "trigger")
+        _check_condition(system, trigger.when, f"{system.name}: record.trigger")
 
 
 def _settable(system: Structure) -> dict[Port, Variable]:
@@ -275,15 +275,13 @@ def _reason_unsettable(system: Structure, interface: Interface, port: Port) -> s
     return f"is an input with a connection: {stuck}"
 
 
-def _check_condition(
-    system: Structure, condition: Condition | None, place: str, key: str = "when"
-) -> None:
+def _check_condition(system: Structure, condition: Condition | None, place: str) -> None:
     if condition is None:
         return
     port, value = condition.port, condition.value
     source, _ = read_at(system, port)
-    source = as_port(f"{place}: {key}", str(source))
-    place = f"{place}: {key} = '{condition}'"
+    source = as_port(place, str(source))
+    place = f"{place} = '{condition}'"
     interface = system.component(source.component, place).interface
     valid = [v.name for v in interface.variables if v.is_number]
     lacking = f"{place}: {source.component} has no number"
@@ -348,5 +346,5 @@ def _check_fault(system: Structure, fault: Fault, place: str) -> None:
             f"{place}: from {seconds(start)} until {seconds(end)}: must hold a communication "
             f"point, a multiple of {written(step)} s"
         )
-    _check_condition(system, fault.when, place)
+    _check_condition(system, fault.when, f"{place}: when")
     whole(f"{place}: seed", fault.seed, 0, must="a whole number, at least 0")
