@@ -229,11 +229,13 @@ def test_no_window_of_an_older_run_is_left(grasp, tmp_path):
     (tmp_path / "window_002").mkdir()
     (tmp_path / "window_002/signals.csv").write_text("older")
     (tmp_path / "window_002/mine.txt").write_text("mine")
+    simulate(grasp, step=1e-2, stop=0.1).save(tmp_path / "window_007")  # another run
     simulate(grasp, step=1e-2, stop=0.1).save(tmp_path)
     files = sorted(str(p.relative_to(tmp_path)) for p in tmp_path.rglob("*"))
-    assert files == ["run.json", "signals.csv", "window_002", "window_002/mine.txt"]
+    others = ["window_007", "window_007/run.json", "window_007/signals.csv"]
+    assert files == ["run.json", "signals.csv", "window_002", "window_002/mine.txt", *others]
     simulate(contact(grasp, after=0.0), stop=0.1).save(tmp_path)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["run.json", "window_002"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["run.json", "window_002", "window_007"]
     assert load_run(tmp_path).windows == ()
 
 
@@ -289,6 +291,10 @@ def test_the_folder_can_be_read_while_the_run_goes_on(grasp, tmp_path):
     assert not back.complete
     assert not window.complete
     assert window.time[-1] == 1.9
+    assert back.measured.values == {}
+    assert back.measured.missing == (
+        "metrics of the run: none, as only the rows of windows are there",
+    )
 
 
 def test_a_window_that_is_gone_is_named(grasp, tmp_path):

@@ -149,8 +149,10 @@ class RunRecord:
 
     def figures_of_every_row(self) -> OfEveryStep | None:
         """What is worked out of every row, where fewer rows or signals are recorded."""
-        if self._every_row is None or self._every_row.lost:
+        if self._every_row is None:
             return None
+        if self._every_row.lost:
+            return OfEveryStep.without(*self.columns()) if self.is_triggered else None
         time, columns = self._every_row.columns()
         system = self._system
         conversions = self._in_si.conversions
@@ -171,7 +173,8 @@ class RunRecord:
         """A line for the log where the rows for the metrics, or those of windows, are not kept."""
         lines = []
         if self._every_row and self._every_row.lost:
-            lines.append(f"{self._every_row.lost}: the metrics are of the rows that were recorded")
+            outcome = "are not there" if self.is_triggered else "are of the rows that were recorded"
+            lines.append(f"{self._every_row.lost}: the metrics {outcome}")
         if isinstance(self._memory, WindowRows) and self._memory.lost:
             lines.append(f"{self._memory.lost}: the result has no rows; those of --out are whole")
         return lines

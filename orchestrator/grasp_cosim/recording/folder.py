@@ -5,7 +5,7 @@ import platform
 import re
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -211,6 +211,7 @@ class RunFolder:
         name, self._window = window.folder, None
         with writing(self._folder / name):
             make_folder(self._place / name)
+            remove(self._place / name, SETTINGS, SIGNALS, ARROW)
         self._file = self._rows_file(name)
         try:
             self._open_file()
@@ -281,6 +282,11 @@ class RunFolder:
 
 def window_folders(folder: Path) -> list[Path]:
     """The folders of the windows of a triggered run in its folder, in their order."""
+    return [path for path in _called_windows(folder) if "window" in (_older(path) or {})]
+
+
+def _called_windows(folder: Path) -> list[Path]:
+    """The folders in a folder that have the names of windows, in the order of their numbers."""
     folders = [path for path in folder.glob("window_*") if WINDOW.fullmatch(path.name)]
     return sorted(
         (path for path in folders if path.is_dir()),
@@ -289,8 +295,13 @@ def window_folders(folder: Path) -> list[Path]:
 
 
 def _remove_windows(place: Path) -> None:
-    """Remove the windows of an older run; what else is in their folders stays."""
-    for folder in window_folders(place):
+    """Remove the windows of an older run, and what a kill left of one.
+
+    Another run in a folder of such a name, and what else is in their folders, stays.
+    """
+    for folder in _called_windows(place):
+        if (folder / SETTINGS).is_file() and "window" not in (_older(folder) or {}):
+            continue
         pictures = of_any_format(ANY_PICTURE, *_groups(folder / SETTINGS))
         remove(folder, SETTINGS, *DRAWN, *pictures, SIGNALS, ARROW)
         if not folder.is_symlink() and not any(folder.iterdir()):
@@ -309,6 +320,7 @@ class OlderRun(TypedDict, total=False):
 
     metrics: list[str]
     windows: list[Any]
+    window: Mapping[str, Any]
 
 
 def _is_of_a_run(folder: Path) -> bool:
@@ -316,11 +328,14 @@ def _is_of_a_run(folder: Path) -> bool:
     if not (folder / SETTINGS).is_file():
         return False
     has_rows = any((folder / name).is_file() for name in (SIGNALS, ARROW))
-    return has_rows or "windows" in (_older(folder / SETTINGS) or {})
+    return has_rows or "windows" in (_older(folder) or {})
 
 
-def _older(settings: Path) -> OlderRun | None:
-    """What a run.json says; None where it is damaged."""
+def _older(folder: Path) -> OlderRun | None:
+    """What the run.json in a folder says, nothing where there is none; None if it is damaged."""
+    settings = folder / SETTINGS
+    if not settings.is_file():
+        return {}
     try:
         content = json_in(str(settings), settings.read_bytes())
         return Decoder().decoded(OlderRun, str(settings), content)
@@ -333,7 +348,7 @@ def _groups(settings: Path) -> Sequence[str]:
 
     All that there are where it is damaged.
     """
-    older = _older(settings) if settings.is_file() else None
+    older = _older(settings.parent) if settings.is_file() else None
     return names("groups") if older is None else older.get("metrics", [])
 
 

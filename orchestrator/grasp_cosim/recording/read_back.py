@@ -100,7 +100,7 @@ def load_run(folder: str | Path) -> Result:
 
 def _triggered(report: RunJson, folder: Path) -> Result:
     """The result of a triggered run, with the rows of its windows."""
-    windows = [load_run(path) for path in window_folders(folder) if (path / SETTINGS).exists()]
+    windows = [load_run(path) for path in window_folders(folder)]
     listed = report.get("windows", [])
     if len(windows) < len(listed):
         raise InputError(
@@ -175,6 +175,8 @@ def _with_figures_of_every_step(read: Result, written: Mapping[str, Any]) -> Res
     """A result of some rows or signals with the metrics that run.json has, which are of all."""
     metrics, measured = metrics_of(read.groups, read.more_metrics), written["measured"]
     worked_out = tuple(m for m in metrics if m.name in measured)
+    if not worked_out and metrics and read.is_triggered:
+        return replace(read, of_every_step=OfEveryStep.without(read.time, read.signals))
     if not worked_out and metrics and read.every > 1:  # it did not come to its end
         line = f"one row in {read.every} was recorded: the metrics are of these"
         return replace(read, log=(*read.log, line))

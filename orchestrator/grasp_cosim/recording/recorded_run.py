@@ -98,6 +98,14 @@ class OfEveryStep:
     measured: Measured
     proxies: Mapping[str, Any]
 
+    @classmethod
+    def without(
+        cls, time: npt.NDArray[np.float64], signals: Mapping[str, npt.NDArray[Any]]
+    ) -> OfEveryStep:
+        """Those of a triggered run of which only the rows of its windows are there: no metrics."""
+        line = "metrics of the run: none, as only the rows of windows are there"
+        return cls(Measured({}, (), (line,)), proxy_figures(time, signals))
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RecordedRun(ByName[npt.NDArray[Any]]):

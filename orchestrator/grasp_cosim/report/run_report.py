@@ -140,7 +140,7 @@ def _sections(result: Result, excerpt: Excerpt, scene: Scene | None) -> dict[str
 
 def _sections_of_windows(result: Result) -> dict[str, tuple[str, str]]:
     """Those of a triggered run: its windows are in the place of traces."""
-    windows = {"windows": ("Recordings", windows_html(result))}
+    windows = {"windows": ("Windows", windows_html(result))}
     settings = {"settings": ("Settings", settings_html(result))}
     return _protocol(result) | windows | _figures(result) | settings
 
