@@ -68,8 +68,8 @@ def test_windows_are_the_rows_of_a_run_without_a_trigger(data):
     every = data.draw(st.integers(1, after + 1))
     high = data.draw(st.sets(st.integers(1, steps)))
     system = pulses(high, steps, before=STEP * before, after=STEP * after)
-    whole = simulate(system.with_record(trigger=""), every=every)
-    is_on = simulate(system.with_record(trigger=""))["a.on"]
+    whole = simulate(system.with_record(trigger=False), every=every)
+    is_on = simulate(system.with_record(trigger=False))["a.on"]
     result = simulate(system, every=every)
     expected = windows_of(is_on.tolist(), before, after)
     assert len(result.windows) == len(expected)

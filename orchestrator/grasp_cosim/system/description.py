@@ -7,7 +7,7 @@ import operator
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, overload
+from typing import Any, Literal, overload
 
 from ..base.errors import InputError, nearest
 from ..base.files import check_nature
@@ -404,7 +404,7 @@ class System(Structure):
     def with_record(
         self,
         *signals: str,
-        trigger: str | None = None,
+        trigger: str | Literal[False] | None = None,
         before: TimeInput | None = None,
         after: TimeInput | None = None,
     ) -> System:
@@ -414,7 +414,7 @@ class System(Structure):
             *signals: Names like "plant.gap[1]", or patterns like "plant.*"; one behind a ! is left
                 out: with_record("!plant.clock"). Without any the outputs are recorded.
             trigger: A condition like "plant.contact[1] == true". A window of the recording begins
-                where it becomes true. "" takes the trigger away. None leaves it as it is.
+                where it becomes true. False takes the trigger away. None leaves it as it is.
             before: How much of what came before is in a window, in s. None leaves it as it is, 0 by
                 default.
             after: How long a window goes on after the last point in it at which the condition

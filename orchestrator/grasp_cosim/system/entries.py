@@ -96,12 +96,13 @@ def sections(
 
 def with_trigger(record: Record, overrides: Mapping[str, Override]) -> Record:
     """The record with another trigger, or other times of it: overrides of "trigger", "before" and
-    "after". An empty trigger takes it away.
+    "after". The trigger false takes it away.
     """
     trigger, times = record.trigger, dict(overrides)
     when = trigger.when if trigger else None
     if override := times.pop("trigger", None):
-        when = read_condition(override.label, override.value) if override.value != "" else None
+        is_gone = override.value is False
+        when = None if is_gone else read_condition(override.label, override.value)
     if when is None:
         for override in times.values():
             raise InputError(
