@@ -145,3 +145,21 @@ def test_with_losses_and_jitter_the_grasp_completes_and_every_datagram_is_accoun
     for finger, force in ((1, 3.43), (2, -3.43)):
         assert result[f"plant.contact[{finger}]"][-1]
         assert result[f"plant.contact_force[{finger}]"][-1] == pytest.approx(force, rel=0.1)
+
+
+def test_the_verdict_on_a_triggered_run_is_on_all_of_its_steps(grasp, tmp_path):
+    """Its windows have a few of them; the outputs of the peer may be what triggers."""
+    system = grasp.with_experiment(step=4e-3, stop=0.4)
+    force = simulate(system)["controller.force[1]"]
+    above = force > -0.05
+    first, second = np.flatnonzero(above & ~np.append(False, above[:-1])).tolist()
+    times = {"before": 0.02, "after": 0.04}
+    with on_the_bench(system, tmp_path, "controller") as benched:
+        triggered = benched.with_record(trigger="controller.force[1] > -0.05", **times)
+        result = simulate(triggered, engine=ENGINE)
+    start, later = result.windows
+    assert start["controller.force[1]"].tolist() == force[first : first + 11].tolist()
+    assert later["controller.force[1]"].tolist() == force[second - 5 : second + 11].tolist()
+    assert result.metrics["proxies"]["controller"]["lost"] == []
+    assert (len(result.verdict), len(start.verdict)) == (8, 0)
+    assert result.passed

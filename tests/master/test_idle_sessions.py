@@ -63,6 +63,22 @@ def test_runs_that_follow_are_as_runs_that_load_their_fmus(native, made):
     assert len(made) == loaded + 1
 
 
+def test_no_window_is_left_to_the_next_run(native, made):
+    """Not even the rows that may come into one."""
+    triggered = native.with_experiment(step=1e-3, stop=3.0)
+    times = {"before": 0.1, "after": 0.2}
+    triggered = triggered.with_record(trigger="plant.contact[1] == true", **times)
+    widths = WIDTHS * 2
+    results = [simulate(wide(triggered, width)) for width in widths]
+    assert len(made) == 1
+    again = dict(zip(widths, results, strict=True))
+    for width, result in zip(widths, results, strict=True):
+        assert all_of(result) == all_of(again[width])
+        (window,) = result.windows
+        assert window.window.number == 1
+        assert len(window.time) == 301
+
+
 def test_a_run_leaves_nothing_to_the_next_one(native, made):
     """Neither states of noise, nor what was set on the way, nor events, nor a value of before."""
     text = {"sensor_1.noise.enabled": True, "sensor_1.noise.seed": 3}

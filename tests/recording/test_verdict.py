@@ -4,12 +4,12 @@ from dataclasses import asdict, replace
 from types import SimpleNamespace
 
 import pytest
-from grasp_cosim import simulate
+from grasp_cosim import InputError, System, metric, simulate
 from grasp_cosim.recording.read_back import load_run
 from grasp_cosim.recording.verdict import judge
 from grasp_cosim.report.run_report import page_html
 from grasp_cosim.report.terminal import run_json, run_text
-from grasp_cosim.system.parts import Acceptance, Condition, Limit, Port
+from grasp_cosim.system.parts import Acceptance, Condition, Limit, MetricLimit, Port
 
 QUIET = {
     "missed": 0, "implausible": 0, "trips": 0, "limited": 0, "lead": 0.0, "lost": [],
@@ -51,7 +51,7 @@ def test_what_a_bench_may_not_do(figures, name, measured):
     found = judged(figures, {})
     assert failed(found) == {name}
     assert found[name].measured == pytest.approx(measured)
-    limits = {**asdict(Acceptance()), name: 1}
+    limits = {**asdict(Acceptance()), "metrics": {}, name: 1}
     assert failed(judged(figures, {}, acceptance=limits)) == set()
 
 
@@ -134,3 +134,122 @@ def run_of():
             )
 
     return run
+
+
+def limited(system, **limits):
+    """A short run with limits of its metrics."""
+    changes = {f"verdict.metrics.{name}": limit for name, limit in limits.items()}
+    return simulate(system.with_experiment(step=1e-3).with_settings(changes))
+
+
+@pytest.mark.parametrize(
+    ("limits", "failures"),
+    [
+        ({"time_difference": 0.05, "object_drift": 1}, []),
+        ({"time_difference": 0.01}, ["time difference: 0.01027 s; must be at most 0.01 s"]),
+        ({"steady_contact_force.low": 3, "steady_contact_force.high": 3.388},
+         ["steady contact force[1]: 3.389 N; must be from 3 N to 3.388 N"]),
+        ({"steady_contact_force.low": 3.5},
+         ["steady contact force[1]: 3.389 N; must be at least 3.5 N",
+          "steady contact force[2]: 3.386 N; must be at least 3.5 N"]),
+        ({"steady_contact_force[2]": "3.3"}, ["steady contact force[2]: 3.386 N; must be at most"
+                                             " 3.3 N"]),
+        ({"smallest_gap": 1}, ["smallest gap: no value; must be at most 1"]),
+    ],
+)  # fmt: skip
+def test_a_metric_may_have_limits(grasp, limits, failures):
+    """Then any run is judged; a metric without a value is beyond them."""
+    result = limited(grasp, **limits)
+    failed = [c for c in result.verdict if not c.passed]
+    assert [str(c).partition(" (verdict.metrics.")[0] for c in failed] == failures
+    assert result.verdict[0].name == "unfinished"
+    assert result.passed == (not failures)
+
+
+def test_a_verdict_prints_as_what_failed(grasp):
+    result = limited(grasp, time_difference=0.01, object_shift=1)
+    assert repr(result.verdict) == (
+        "failed 1 of 3 criteria: time difference: 0.01027 s; must be at most 0.01 s "
+        "(verdict.metrics.time_difference)"
+    )
+    assert repr(limited(grasp, object_shift=1).verdict) == "passed all 2 criteria"
+    with pytest.raises(AssertionError, match=r"time difference: 0\.01027 s; must be"):
+        assert result.passed, result.verdict
+
+
+def test_limits_of_metrics_are_in_the_files_and_on_the_page(grasp, tmp_path):
+    result = limited(grasp, **{"time_difference": 0.01, "peak_contact_force.low": 1})
+    result.save(tmp_path)
+    read = load_run(tmp_path)
+    assert read.verdict == result.verdict
+    assert read.settings["acceptance"]["metrics"] == {
+        "time_difference": {"low": None, "high": 0.01},
+        "peak_contact_force": {"low": 1.0, "high": None},
+    }
+    page = page_html(read)
+    assert "Failed: time difference." in page
+    assert "at least 1 N" in page
+    assert run_json(read)["verdict"][1] == {
+        "name": "metrics.time_difference",
+        "what": "time difference",
+        "limit": 0.01,
+        "measured": read.metrics["time_difference"],
+        "unit": "s",
+        "passed": False,
+    }
+
+
+def test_a_metric_of_true_or_false_may_have_to_be_one_of_them(grasp):
+    @metric("touched")
+    def touched(run):
+        """Whether a finger touches."""
+        return bool(run["plant.contact[1]"].any())
+
+    system = grasp.with_experiment(step=1e-3).with_settings({"verdict.metrics.touched": "false"})
+    (_, criterion) = simulate(system, metrics=[touched]).verdict
+    assert str(criterion) == "touched: 1; must be 0 (verdict.metrics.touched)"
+
+
+def read(tmp_path, grasp, verdict):
+    """The grasp as a file with these lines."""
+    lines = [f"{c.source} -> {c.target}" for c in grasp.connections]
+    fmus = [f'[components.{c.name}]\nfmu = "{c.fmu}"' for c in grasp.components]
+    text = f'metrics = ["grasp"]\nconnections = {lines}\n[experiment]\nstep = 1e-3\nstop = 0.1\n'
+    (tmp_path / "s.toml").write_text("\n".join([text, *fmus, verdict]), "utf-8")
+    return System.load(tmp_path / "s.toml")
+
+
+def test_a_file_has_them_as_numbers_or_with_both_ends(grasp, tmp_path):
+    table = (
+        '[verdict.metrics]\ntime_difference = 0.05\n"impact_velocity[1]" = { low = 0, high = 1 }'
+    )
+    system = read(tmp_path, grasp, table)
+    assert system.verdict == Acceptance(
+        metrics=(
+            MetricLimit("time_difference", None, 0.05),
+            MetricLimit("impact_velocity[1]", 0.0, 1.0),
+        )
+    )
+    changed = system.with_settings({"verdict.metrics.impact_velocity[1].low": 0.5})
+    assert changed.verdict.metrics[1] == MetricLimit("impact_velocity[1]", 0.5, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("time_diference = 1", "s.toml: verdict.metrics: no metric 'time_diference'; did you mean "
+         "time_difference"),
+        ('time_difference = "x"', "s.toml: verdict.metrics.time_difference = 'x': must be the "
+         "highest value, a finite number, or true or false"),
+        ("time_difference = { hi = 1 }", "s.toml: verdict.metrics.time_difference: unknown entry "
+         "'hi'; valid: high, low"),
+        ("time_difference = { low = 2, high = 1 }", "s.toml: verdict.metrics.time_difference.high ="
+         " 1: low = 2 must be at most high = 1"),
+        ("time_difference = { low = true }", "s.toml: verdict.metrics.time_difference.low = True: "
+         "must be a finite number"),
+    ],
+)  # fmt: skip
+def test_a_limit_of_a_metric_that_cannot_be_is_refused(grasp, tmp_path, line, message):
+    with pytest.raises(InputError) as caught:
+        simulate(read(tmp_path, grasp, f"[verdict.metrics]\n{line}"))
+    assert str(caught.value).startswith(message)

@@ -14,12 +14,14 @@ from grasp_cosim import InputError, Realtime, System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_cosim.system.parts import (
+    Acceptance,
     Component,
     Condition,
     Connection,
     Event,
     Fault,
     Initialisation,
+    MetricLimit,
     Port,
 )
 from ssp.hand_made import (
@@ -100,6 +102,7 @@ def test_what_ssp_has_no_form_for_comes_back(grasp, tmp_path):
         ),
         roles={"hand": "plant"},
         presets={"wide": {"plant.object_width": 0.08}, "loud": {"sensor_1.noise.seed": 3}},
+        verdict=Acceptance(lost=1, metrics=(MetricLimit("time_difference", None, 0.05),)),
     )
     assert round_trip(full, tmp_path) == full
 
@@ -335,7 +338,8 @@ def test_run_says_what_was_decided(tmp_path, command):
 
 
 def test_what_is_recorded_comes_back(grasp, tmp_path):
-    original = grasp.with_record("plant.*", "!plant.force*")
+    times = {"before": "1/3", "after": 0.5}
+    original = grasp.with_record("plant.*", "!plant.force*", trigger="plant.gap[1] < 0.01", **times)
     again = round_trip(original, tmp_path)
     assert again == original
     assert [*again.recorded] == [*original.recorded]

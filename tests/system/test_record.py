@@ -1,8 +1,12 @@
-"""What [record] of a system file names: which signals are recorded, in which order; mistakes."""
+"""What [record] of a system file names: which signals are recorded, in which order, and when."""
+
+from dataclasses import replace
+from fractions import Fraction
 
 import pytest
 from grasp_cosim import InputError, System
 from grasp_cosim.system.record import Pattern, Record
+from grasp_cosim.system.settings import run_settings
 from support.native_fmus import state_space
 
 VARIABLES = """
@@ -168,7 +172,7 @@ def test_an_array_stands_for_its_elements(tmp_path):
 
 
 def test_a_list_of_a_command_line_has_commas_but_in_brackets():
-    listed = Record.from_texts(["b.y, a.A[1,2],a.f(x,y)", "!c.*"])
+    listed = Record().with_texts(["b.y, a.A[1,2],a.f(x,y)", "!c.*"])
     assert listed.signals == ("b.y", "a.A[1,2]", "a.f(x,y)", "!c.*")
 
 
@@ -189,3 +193,66 @@ def test_a_component_may_be_called_record(folder):
 def test_a_list_in_the_place_of_names_is_refused(grasp):
     with pytest.raises(InputError, match=r"^record: \['plant.\*'\]: must be a name; several are"):
         grasp.with_record(["plant.*"])
+
+
+TRIGGERED = 'trigger = "b.y > 0.5"\nbefore = 0.25\nafter = "1/3"'
+
+
+def test_a_trigger_is_read_set_and_taken_away(load):
+    """In a file, by --set, in Python; times are exact, and signals are chosen as without it."""
+    system = load(f'[record]\nsignals = ["a.*"]\n{TRIGGERED}')
+    trigger = system.record.trigger
+    assert (str(trigger.when), names(system)) == ("b.y > 0.5", ["a.x"])
+    assert (trigger.before_ns, trigger.after_ns) == (250_000_000, Fraction(10**9, 3))
+    assert run_settings(system)["trigger"] == {"when": "b.y > 0.5", "before": 0.25, "after": 1 / 3}
+    assert "trigger" not in run_settings(load())
+    texts = {"record.trigger": "b.y > 0.5", "record.before": "0.25", "record.after": "1/3"}
+    assert load().with_settings(texts).record.trigger == trigger
+    again = load().with_record("a.*", trigger="b.y > 0.5", before=(250, "ms"), after="1/3")
+    assert again.record == system.record
+    later = system.with_settings({"record.after": 2})
+    assert later.record.trigger == replace(trigger, after_ns=2 * 10**9)
+    assert names(later) == ["a.x"]
+    assert later.with_record("b.y").record.trigger == later.record.trigger
+    assert system.with_settings({"record.trigger": "false"}).record == Record(("a.*",))
+    assert system.with_record("a.*", trigger=False).record == Record(("a.*",))
+    alone = load().with_record(trigger="b.u >= 0", after=0)  # of a signal that is not recorded
+    assert (alone.record.trigger.before_ns, alone.record.trigger.after_ns) == (0, 0)
+
+
+@pytest.mark.parametrize(
+    ("record", "message"),
+    [
+        ('trigger = "b.x > 1"\nafter = 1', "s.toml: record.trigger = 'b.x > 1.0': b has no number"
+         " 'x'; "),
+        ('trigger = "c.y > 1"\nafter = 1', "s.toml: record.trigger = 'c.y > 1.0': no component "
+         "'c'; "),
+        ("trigger = \"b.engine.mode == 'on'\"\nafter = 1", "s.toml: record.trigger = "
+         "'b.engine.mode == 'on'': b has no number 'engine.mode'; "),
+        ('trigger = "b.y == 1"\nafter = 1', "s.toml: record.trigger = 'b.y == 1.0': b.y is Real; "
+         "must be compared with a finite number, by <, <=, >, >="),
+        ('trigger = "b.y"\nafter = 1', "s.toml: record.trigger = 'b.y': must be like 'plant.gap"),
+        ("trigger = 1\nafter = 1", "s.toml: record.trigger = 1: must be like 'plant.gap[1] < 0"),
+        ('trigger = "b.y > 1"', "s.toml: record.after: no entry; a trigger must have one, a time "),
+        ('trigger = "b.y > 1"\nafter = -1', "s.toml: record.after = -1 s: must be a number from 0"),
+        ('trigger = "b.y > 1"\nafter = 1\nbefore = -0.5', "s.toml: record.before = -0.5 s: must be "
+         "a number from 0 to "),
+        ("before = 0.5", "s.toml: record.before = 0.5: there is no trigger; must have one, like "),
+        ("after = 0.5", "s.toml: record.after = 0.5: there is no trigger; must have one, like "),
+        ('triger = "b.y > 1"', "s.toml: [record]: unknown entry 'triger'; did you mean trigger?"),
+    ],
+)  # fmt: skip
+def test_a_trigger_that_cannot_be_is_refused_in_a_line(load, record, message):
+    with pytest.raises(InputError) as caught:
+        load(f"[record]\n{record}")
+    assert str(caught.value).startswith(message)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_component_may_still_be_called_record(folder):
+    text = SYSTEM.replace("components.a", "components.record")
+    (folder / "named.toml").write_text(f"{text}[record]\n{TRIGGERED}", "utf-8")
+    system = System.load(folder / "named.toml")
+    assert system.record.trigger is not None
+    with pytest.raises(InputError, match="trigger"):
+        system.with_settings({"record.trigger": "b.y > 1"})  # a variable of that component

@@ -16,7 +16,6 @@ from ..recording.log_names import AS_THEY_ARE, read_log_names
 from ..system.connectors import reached
 from ..system.description import System, read_system
 from ..system.overrides import Override
-from ..system.record import Record
 from ..system.stimuli import Stimuli, read_stimuli
 from .frame import PATH, pair, say, waiting
 
@@ -259,7 +258,7 @@ def chosen_system(options: SystemOptions) -> System:
     for note in system.notes[len(loaded.notes) :]:
         say(note)
     if options.record:
-        record = Record.from_texts(options.record)
+        record = system.record.with_texts(options.record)
         record.check("--record", system.components, system.outputs)
         system = replace(system, record=record)
     return system.with_input(replace(stimuli, partial=False)) if stimuli else system

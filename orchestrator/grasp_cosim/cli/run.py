@@ -139,12 +139,13 @@ def run(
         except RunInterruptedError as interrupted:
             result = interrupted.result
     if not result.came_to_its_end:
-        message = f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded"
+        message = f"interrupted at t = {result.end_time:.6g} s; kept what was recorded"
         return fail(message, INTERRUPTED)
     for criterion in result.verdict:
         if not criterion.passed:
             say(f"verdict: {criterion}")
-    return 0 if result.signals and result.passed else NEGATIVE  # a line above gives the reason
+    is_recorded = result.signals and len(result.time)
+    return 0 if is_recorded and result.passed else NEGATIVE  # a line above gives the reason
 
 
 def _write(
@@ -153,11 +154,14 @@ def _write(
     """Finish the folder of a run, and write or draw what else there is to be of it."""
     if folder:
         folder.finish(result)
+    parts = result.windows if result.is_triggered else (result,)
     if out and mdf and result.signals:
-        result.to_mdf(out / "signals.mf4")
+        for part in parts:
+            part.to_mdf(out / part.subfolder / "signals.mf4")
     if plot and result.numbers:
         from ..report.timing_chart import draw_pictures  # only here: most runs draw nothing
 
         with waiting("drawing"):
-            for picture in draw_pictures(result, out or Path(), "png"):
-                say(f"drew {picture}")
+            for part in dict.fromkeys((*parts, result)):
+                for picture in draw_pictures(part, (out or Path()) / part.subfolder, "png"):
+                    say(f"drew {picture}")

@@ -184,7 +184,7 @@ def _recorded(run: Result | str | Path, called: str, names: LogNames) -> Side | 
 
 def _ran(system: Result | str | Path, counterpart: Side | None) -> Side:
     """The run of a system file, no longer than the other run."""
-    loaded = System.load(str(system))
+    loaded = System.load(str(system)).untriggered()
     if counterpart:
         span = nearest_time(float(counterpart.time[-1])) - loaded.start_ns
         stop = min(loaded.stop_ns, loaded.time_ns(max(int(span // loaded.step_ns), 1)))

@@ -242,7 +242,7 @@ def prepare_swap(
     _check_renamed(rename, original, interface)
     common, extra = _divided(values, component, original, interface)
     extra = {n: v for n, v in new.values.items() if n not in original.by_name} | extra
-    system = system.with_overrides(as_overrides(common, "--set {place}"))
+    system = system.with_overrides(as_overrides(common, "--set {place}")).untriggered()
     system = replace(system, record=system.record.with_outputs(system.components))
     use = use_of(system, component)
     differences = interface_differences(original, interface, use, extra)

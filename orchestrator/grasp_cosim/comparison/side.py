@@ -176,8 +176,18 @@ def unread(a: Side, b: Side, metrics: Iterable[Metric]) -> tuple[str, ...]:
     return tuple(name for name in optional if (name in a.signals) != (name in b.signals))
 
 
+MAX_WINDOWS = 3
+"""So many windows of a triggered run are named."""
+
+
 def side_of(run: Result, called: str) -> Side:
-    """The side of a result, which is `called` so."""
+    """The side of a result, which is `called` so; InputError of a triggered run, for its gaps."""
+    if run.is_triggered:
+        windows = [str(Path(called) / part.subfolder) for part in run.windows] or ["another run"]
+        raise InputError(
+            f"{called}: recorded windows with gaps between; must be one of them: "
+            f"{choices(windows, MAX_WINDOWS)}"
+        )
     texts = [name for name in run if name not in run.numbers]
     return Side(
         called, run.time, run.numbers, run.units, run.to_si, texts, run, None, run.roles, run.given,
@@ -278,6 +288,7 @@ def _facts(run: Result) -> Iterator[tuple[str, str]]:
     for kind in ("events", "faults"):
         yield kind, "; ".join(map(_words, settings[kind])) or NONE
     yield from _nested("input ", settings.get("input", {}))
+    yield from _nested("trigger: ", settings.get("trigger", {}))
     yield from _nested("version of ", run.origin.get("versions", {}))
 
 

@@ -25,17 +25,22 @@ from .listener import (
     Floats,
     Leisurely,
     Listener,
+    OfWindows,
     Selective,
     Signal,
     Steps,
     Texts,
+    Window,
 )
+from .trigger import TriggeredRows
 
 CONTINUE_ADVICE = 'or let it go on: diverging = "continue"'
 
 
 class Dispatcher:
     """Takes rows of all values and hands every n-th one on, and the last.
+
+    Of a triggered recording only those that are in its windows.
 
     Listeners get the signals that are recorded, in the order of the system, then its own outputs
     and the energies of its exchanges. The outputs of components end the run where they run away or
@@ -68,6 +73,7 @@ class Dispatcher:
         """
         self._owner = os.getpid()
         self._listeners, self._every_row = tuple(listeners), every_row
+        self._of_windows = [listener for listener in listeners if isinstance(listener, OfWindows)]
         self._leisurely = [listener for listener in listeners if isinstance(listener, Leisurely)]
         self.listener_seconds = 0.0
         """The time in s that the listeners took for their blocks."""
@@ -94,6 +100,10 @@ class Dispatcher:
         self.signals = self._recorded.signals
         self.pending: tuple[Steps, Floats] | None = None
         """The last row, where decimation has left it out so far."""
+        trigger = system.record.trigger
+        self.trigger = TriggeredRows(system, trigger, slots) if trigger else None
+        """What decides on the rows of a triggered recording; None of any other."""
+        self._begun = False
         self.settings = run_settings(system)
         experiment = Experiment.of(self.settings)
         with ExitStack() as ends:
@@ -108,8 +118,11 @@ class Dispatcher:
 
     @property
     def log(self) -> list[str]:
-        """A line for each signal that ran away in a run that went on, or that is not as it was."""
-        return [*self._runaways, *self._inexact.log]
+        """A line for each window, and each signal that ran away in a run that went on, or that is
+        not as it was.
+        """
+        windows = self.trigger.log if self.trigger else ()
+        return [*windows, *self._runaways, *self._inexact.log]
 
     def __call__(self, steps: Steps, rows: Floats) -> None:
         """Hand rows on; SimulationError at the first value that is not finite or has run away.
@@ -124,9 +137,12 @@ class Dispatcher:
             self._every_row.block(steps, self._for_every_row(rows))
         self.pending = None
         nth = slice(-int(steps[0]) % self._every, None, self._every)
-        if len(steps[nth]):
-            self._hand_on(steps[nth], self._recorded(rows[nth]))
-        if steps[-1] % self._every:
+        if self.trigger:
+            self._begin_run()
+            self.trigger(self, steps, rows, steps[nth], self._recorded(rows[nth]))
+        elif len(steps[nth]):
+            self.hand_on(steps[nth], self._recorded(rows[nth]))
+        if steps[-1] % self._every and (self.trigger is None or self.trigger.is_open):
             self.pending = steps[-1:].copy(), self._recorded(rows[-1:])
         if message:
             raise SimulationError(message)
@@ -134,11 +150,13 @@ class Dispatcher:
     def saved(self) -> tuple[Any, ...]:
         """What the rows until now came to, for restore()."""
         checks = [*self._runaways], self._divergence.saved(), self._inexact.saved()
-        return checks, self.pending
+        return checks, self.pending, self.trigger.saved() if self.trigger else None
 
     def restore(self, saved: tuple[Any, ...]) -> None:
         """Go back to what was saved; what the listeners got is their own concern."""
-        (runaways, divergence, inexact), self.pending = saved
+        (runaways, divergence, inexact), self.pending, windows = saved
+        if self.trigger:
+            self.trigger.restore(windows)
         self._runaways = [*runaways]
         self._divergence.restore(divergence)
         self._inexact.restore(inexact)
@@ -198,9 +216,29 @@ class Dispatcher:
                 stack.callback(listener.end, complete)
             pending, self.pending = self.pending, None
             if pending is not None:
-                self._hand_on(*pending)
+                self.hand_on(*pending)
+            if self.trigger:
+                self.trigger.end(self, complete)
 
-    def _hand_on(self, steps: Steps, rows: Floats) -> None:
+    def _begin_run(self) -> None:
+        """Tell the listeners that a triggered run has begun, once."""
+        if not self._begun:
+            self._begun = True
+            for listener in self._of_windows:
+                listener.begin_run()
+
+    def begin_window(self, window: Window) -> None:
+        """Tell the listeners of the window whose rows come now."""
+        for listener in self._of_windows:
+            listener.begin_window(window)
+
+    def end_window(self, window: Window) -> None:
+        """Tell the listeners of the window whose rows came."""
+        for listener in self._of_windows:
+            listener.end_window(window)
+
+    def hand_on(self, steps: Steps, rows: Floats) -> None:
+        """Hand rows that are recorded on to the listeners."""
         start = time.perf_counter()
         for listener in self._listeners:
             listener.block(steps, rows)

@@ -101,6 +101,43 @@ class Listener(Protocol):
         """Called once after the last row, also after a failure (complete is then False)."""
 
 
+@dataclass(frozen=True, slots=True)
+class Window:
+    """A recording of a triggered run, of which there are several, without a row in two of them.
+
+    `time` in s is that of the communication point at which its trigger came true first. It came
+    true so many `times` in the window, of which the first are told where that begins. It is not
+    `complete` where the run broke off before its end.
+    """
+
+    number: int
+    time: float
+    times: int = 1
+    complete: bool = False
+
+    @property
+    def folder(self) -> str:
+        """The name of its folder, in that of the run."""
+        return f"window_{self.number:03d}"
+
+
+@runtime_checkable
+class OfWindows(Listener, Protocol):
+    """A listener that is told where the windows of a triggered run begin and end.
+
+    Others get the rows of all windows, one after the other.
+    """
+
+    def begin_run(self) -> None:
+        """Called at the first row of a triggered run, be it recorded or not."""
+
+    def begin_window(self, window: Window) -> None:
+        """Called before the first row of a window."""
+
+    def end_window(self, window: Window) -> None:
+        """Called after its last row."""
+
+
 class Selective(Listener, Protocol):
     """A listener that gets the signals of some names only."""
 

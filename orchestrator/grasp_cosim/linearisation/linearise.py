@@ -81,7 +81,7 @@ def linearise(
     sources = {connection.target: connection.source for connection in system.connections}
     cuts = {port: Cut() for port in ports if port in sources}
     recorded = [name for name in output_names if as_signal("output", name) not in cuts]
-    with Session(system.with_record(*recorded), cuts=cuts) as session:
+    with Session(system.untriggered().with_record(*recorded), cuts=cuts) as session:
         if first_step:
             session.step(first_step)
         time = session.time

@@ -76,9 +76,13 @@ def used(system: System) -> frozenset[Port]:
 
 
 def in_conditions(system: System) -> frozenset[Port]:
-    """The signals that conditions of events, faults and limits name, and the states of proxies."""
+    """The signals that conditions name, of events, faults, limits and a trigger, and the states of
+    proxies.
+    """
     conditions = [*(e.when for e in system.events), *(f.when for f in system.faults)]
     conditions += [limit.when for limit in system.limits]
+    if system.record.trigger:
+        conditions.append(system.record.trigger.when)
     signals = {read_at(system, c.port)[0] for c in conditions if c is not None}
     return frozenset(signals | {*system.once(states_of_proxies)})
 

@@ -66,7 +66,7 @@ class RunLog:
 
     def lines(self, master: Master, is_over: bool) -> tuple[str, ...]:
         """All lines until now. A run that is over also names what was still to happen in it."""
-        pending = master.scenario.pending() if is_over else ()
+        pending = [*master.scenario.pending(), *self._record.trigger_log()] if is_over else []
         return (
             *self._at_start(master),
             *self._record.dispatcher.log,

@@ -6,14 +6,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..base.checks import known
 from ..exchange.bounds import Bounds
 from ..exchange.dispatch import Dispatcher
-from ..exchange.listener import Listener, Signal, Texts
+from ..exchange.listener import Listener, Signal, Texts, Window
+from ..exchange.trigger import check_every
 from ..interface.units import Conversion
 from ..metrics.groups import check_groups, chosen, metrics_of
 from ..metrics.in_si import in_si
 from ..metrics.metric import Function, Metric, Signals, measure, needed
-from ..recording.memory import Columns, EveryRow, MemoryListener
+from ..recording.memory import Columns, EveryRow, MemoryListener, WindowRows
 from ..recording.proxies import of_proxies, proxy_figures, proxy_lines
 from ..recording.recorded_run import OfEveryStep
 from ..system.description import System
@@ -25,8 +27,9 @@ from ..system.times import in_seconds
 class RunRecord:
     """Receives the rows of the master and keeps what the result of the run is made of.
 
-    Every n-th row goes to the memory and to the listeners. Where the metrics need more than that,
-    be it more signals or every row, a temporary file has what they need.
+    Every n-th row goes to the memory and to the listeners, of a triggered run those in its windows.
+    Where the metrics need more than that, be it more signals or every row, a temporary file has
+    what they need.
     """
 
     def __init__(
@@ -37,19 +40,24 @@ class RunRecord:
         in_real_time: bool,
     ) -> None:
         """Choose the metrics. InputError, before any FMU is loaded, where they cannot be had."""
+        check_every(system, every)
         self._system, self.every = system, every
         self.metrics = chosen(metrics, system.metrics, system.observed_names, system.roles)
         """The metrics of this run in addition to those of the system."""
         self._all_metrics = metrics_of(system.metrics, self.metrics)
         self.group_notes = check_groups(system)
         """Lines for the log on groups of metrics of the system that are not available."""
+        _check_limits(system, self._all_metrics)
         self._in_si = in_si(system, self._all_metrics)
-        self._memory = MemoryListener(every, in_real_time)
+        self.is_triggered = system.record.trigger is not None
+        """True if only windows around a trigger are recorded."""
+        self._memory = WindowRows() if self.is_triggered else MemoryListener(every, in_real_time)
         self._every_row: EveryRow | None = None
         signals = needed(self._all_metrics, system.observed_names, system.roles) | of_proxies(
             system.observed_names
         )
-        if every > 1 or not signals <= system.recorded_names:
+        is_thinned = every > 1 or (self.is_triggered and (self._all_metrics or signals))
+        if is_thinned or not signals <= system.recorded_names:
             self._every_row = EveryRow(signals)
 
     def begin(
@@ -130,6 +138,10 @@ class RunRecord:
         """Time in s and the columns of the recorded signals by name, until now."""
         return self._memory.columns(self.dispatcher.pending)
 
+    def windows(self, count: int) -> list[tuple[Window, slice]]:
+        """The windows of a triggered run until now, and where their rows are in so many."""
+        return self._memory.windows(count) if isinstance(self._memory, WindowRows) else []
+
     def conversions(self) -> dict[str, Conversion]:
         """How those of the recorded signals that are not in SI are converted, by name."""
         names = {signal.name for signal in self.signals}
@@ -137,8 +149,10 @@ class RunRecord:
 
     def figures_of_every_row(self) -> OfEveryStep | None:
         """What is worked out of every row, where fewer rows or signals are recorded."""
-        if self._every_row is None or self._every_row.lost:
+        if self._every_row is None:
             return None
+        if self._every_row.lost:
+            return OfEveryStep.without(*self.columns()) if self.is_triggered else None
         time, columns = self._every_row.columns()
         system = self._system
         conversions = self._in_si.conversions
@@ -156,7 +170,24 @@ class RunRecord:
         return proxy_lines(time, columns, in_seconds(self._system.step_ns))
 
     def loss_log(self) -> list[str]:
-        """A line for the log where the rows for the metrics could not be kept."""
-        if self._every_row is None or not self._every_row.lost:
-            return []
-        return [f"{self._every_row.lost}: the metrics are of the rows that were recorded"]
+        """A line for the log where the rows for the metrics, or those of windows, are not kept."""
+        lines = []
+        if self._every_row and self._every_row.lost:
+            outcome = "are not there" if self.is_triggered else "are of the rows that were recorded"
+            lines.append(f"{self._every_row.lost}: the metrics {outcome}")
+        if isinstance(self._memory, WindowRows) and self._memory.lost:
+            lines.append(f"{self._memory.lost}: the result has no rows; those of --out are whole")
+        return lines
+
+    def trigger_log(self) -> list[str]:
+        """A line for the log on a trigger that never came true."""
+        trigger = self.dispatcher.trigger
+        return [*trigger.absence] if trigger else []
+
+
+def _check_limits(system: System, metrics: Sequence[Metric]) -> None:
+    """InputError at the first limit of [verdict.metrics] for a metric that there is not."""
+    sized = [m.of(system.observed_names, system.roles) for m in metrics]
+    names = [name for m in sized for name in dict.fromkeys((m.name, *m.columns))]
+    for limit in system.verdict.metrics:
+        known(f"{system.name}: verdict.metrics: no metric", limit.name, names)

@@ -612,13 +612,14 @@ class Session:
             self.master.hand_on()
         master, record = self.master, self._record
         time, columns = record.columns()
+        windows = record.windows(len(time))
         units = {signal.name: signal.unit for signal in record.signals}
         descriptions = {signal.name: signal.description for signal in record.signals}
         timing = None
         if self.pacer:
             privileges = self._privileges
             timing = self.pacer.meter.timing(privileges.granted, privileges.refused)
-        return Result(
+        result = Result(
             record.settings,
             time,
             columns,
@@ -637,7 +638,9 @@ class Session:
             initialised_anew=tuple(master.renewed),
             peers=master.peers,
             components=self.system.components,
+            steps_done=master.steps_done if record.is_triggered else None,
         )
+        return replace(result, windows=tuple(result.part(*window) for window in windows))
 
 
 def with_twins(system: System, progress: bool = False) -> System:

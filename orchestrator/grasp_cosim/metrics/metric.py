@@ -37,7 +37,7 @@ Value = float | bool | None
 RESERVED = frozenset((
     "complete", "ended_at", "error", "index", "missing_metrics", "proxies",
     "real_time_factor", "realtime", "scheme", "step", "steps", "stop", "units", "verdict",
-    "wall_time",
+    "wall_time", "windows",
 ))  # fmt: skip
 """Names next to metrics in what `run --json` prints, and in the table of a sweep."""
 
@@ -380,6 +380,10 @@ class Measured:
     def flat(self) -> dict[str, Value]:
         """Single values by column, name or name[1]; InputError where a function failed."""
         self.check()
+        return self.columns()
+
+    def columns(self) -> dict[str, Value]:
+        """The same of those metrics that did not fail."""
         values: dict[str, Value] = {}
         for name, value in self.values.items():
             if isinstance(value, list):

@@ -2,12 +2,14 @@
 
 import os
 import platform
+import re
 import time
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, Literal, Self, TypedDict, get_args
@@ -15,12 +17,12 @@ from typing import Any, Literal, Self, TypedDict, get_args
 import numpy as np
 import numpy.typing as npt
 
-from ..base.errors import InputError
+from ..base.errors import InputError, SimulationError
 from ..base.files import make_folder, of_any_format, remove, unwritable
 from ..base.registry import names
 from ..base.scratch import SUFFIX, Lock
 from ..base.typed_json import Decoder, json_in
-from ..exchange.listener import Experiment, Listener, Signal
+from ..exchange.listener import Experiment, Listener, Signal, Window
 from ..metrics.in_si import in_si
 from ..metrics.metric import Measured
 from ..system.description import System
@@ -32,6 +34,9 @@ from .recorded_run import OfEveryStep, RecordedRun
 
 SIGNALS, ARROW, SETTINGS = "signals.csv", "signals.arrow", "run.json"
 """The files of a run's folder, of which it has one of the former two."""
+
+WINDOW = re.compile(r"window_\d{3,}")
+"""The folders of the windows of a triggered run, in its folder. Each is the folder of a run."""
 
 ANY_PICTURE = "signals"
 """The stem of the picture of a result that is of no group of metrics with one more."""
@@ -56,6 +61,8 @@ class RunFolder:
     it was. From then on the folder has the rows until now and a run.json with "complete": false,
     until finish(). At no moment there are files of two runs. Its context keeps other runs out of
     the folder from the first row on.
+
+    The rows of a triggered run are in the folders of its windows.
     """
 
     def __init__(
@@ -81,11 +88,13 @@ class RunFolder:
         else:
             conversions = in_si(of, ()).conversions
             self._to_si = {name: c for name, c in conversions.items() if name in of.recorded_names}
-        name = ARROW if form == "arrow" else SIGNALS
-        kind = ArrowListener if form == "arrow" else CsvListener
-        self._file: Listener = kind(folder / name, self._place / name)
-        self._begun, self._broken = False, False
-        self._waiting: deque[Rows] = deque()
+        self._form = form
+        self._file = self._rows_file()
+        self._file_is_open = False
+        self._begun, self._broken, self._is_triggered = False, False, False
+        self._window: Window | None = None
+        """The one whose folder is made with its first row."""
+        self._waiting: deque[Rows | Callable[[], None]] = deque()
         self._row_ns, self._at_last_ns = FIRST_GUESS, 0.0
         self._lock = Lock(self._place / SUFFIX)
 
@@ -96,9 +105,35 @@ class RunFolder:
         """Let others into the folder."""
         self._lock.release()
 
+    def _rows_file(self, window: str = "") -> Listener:
+        """What writes the rows, into the folder of a window of that name."""
+        name = ARROW if self._form == "arrow" else SIGNALS
+        kind = ArrowListener if self._form == "arrow" else CsvListener
+        return kind(self._folder / window / name, self._place / window / name)
+
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Nothing is written yet."""
         self._experiment, self._signals = experiment, tuple(signals)
+
+    def begin_run(self) -> None:
+        """Take the folder for a triggered run; errors as of block()."""
+        self._is_triggered = True
+        self._take_the_folder(np.empty(0, np.int64), np.empty((0, len(self._signals))))
+
+    def begin_window(self, window: Window) -> None:
+        """Take note of a window."""
+        self._do(partial(setattr, self, "_window", window))
+
+    def end_window(self, window: Window) -> None:
+        """Close the file of a window."""
+        self._do(self._close_file)
+
+    def _do(self, work: Callable[[], None]) -> None:
+        """Do it behind the rows that wait."""
+        if self._waiting:
+            self._waiting.append(work)
+        else:
+            work()
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Take the rows; InputError where the folder is not for us, SimulationError if it fails."""
@@ -111,11 +146,14 @@ class RunFolder:
 
     def spare(self, ns: float) -> bool:
         """Write rows that wait, as many as take about so many ns, and one at last."""
+        while self._waiting and callable(work := self._waiting[0]):
+            self._waiting.popleft()
+            work()
         start = time.perf_counter_ns()
         count = max(int(ns / self._row_ns), int(start > self._at_last_ns))
         if not self._waiting or count < 1:
             return False
-        steps, rows = self._waiting.popleft()
+        steps, rows = self._waiting.popleft()  # type: ignore[misc]  # no work is in front
         if count < len(steps):
             self._waiting.appendleft((steps[count:], rows[count:]))
         self._write(steps[:count], rows[:count])
@@ -130,32 +168,69 @@ class RunFolder:
         if self._begun:
             try:
                 while self._waiting and not self._broken:
-                    self._write(*self._waiting.popleft())
+                    work = self._waiting.popleft()
+                    if callable(work):
+                        work()
+                    else:
+                        self._write(*work)
             finally:
-                if self._signals:
-                    with self._whole_only_if_written():
-                        self._file.end(complete)
+                self._close_file(complete)
 
     def finish(self, result: RecordedRun) -> None:
         """Write the run.json of a result that ended, in whatever way; not if rows are missing.
 
         SimulationError where that fails.
         """
-        if self._begun and not self._broken:
-            with writing(self._folder / SETTINGS):
-                self._write_settings(result)
+        if not self._begun or self._broken:
+            return
+        parts: tuple[RecordedRun, ...] = (*result.windows, result)
+        for part in parts:
+            place = part.subfolder if self._is_triggered else ""
+            with writing(self._folder / place / SETTINGS):
+                self._write_settings(part, place)
 
-    def _write_settings(self, result: RecordedRun) -> None:
+    def _write_settings(self, result: RecordedRun, window: str = "") -> None:
         origin = dict(self._origin)
         if result.components:
             origin["fmus"] = fmus_of(result.components)
-        replace(result, origin=origin).to_json(self._place / SETTINGS)
+        replace(result, origin=origin).to_json(self._place / window / SETTINGS)
 
     def _write(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         if not self._signals:
             return
         with self._whole_only_if_written():
-            self._file.block(steps, rows)
+            if self._window:
+                self._open_window(self._window, steps, rows)
+            else:
+                self._file.block(steps, rows)
+
+    def _open_window(
+        self, window: Window, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]
+    ) -> None:
+        """Make the folder of a window, with its first rows; SimulationError where that fails."""
+        name, self._window = window.folder, None
+        with writing(self._folder / name):
+            make_folder(self._place / name)
+            remove(self._place / name, SETTINGS, SIGNALS, ARROW)
+        self._file = self._rows_file(name)
+        try:
+            self._open_file()
+        except InputError as error:  # the run goes on already
+            raise SimulationError(str(error)) from error
+        self._file.block(steps, rows)
+        with writing(self._folder / name / SETTINGS):
+            self._write_settings(replace(self._begun_run(steps, rows), window=window), name)
+
+    def _open_file(self) -> None:
+        self._file.begin(self._experiment, self._signals)
+        self._file_is_open = True
+
+    def _close_file(self, complete: bool = True) -> None:
+        """Close the file of the rows, if it is open."""
+        if self._file_is_open:
+            self._file_is_open = False
+            with self._whole_only_if_written():
+                self._file.end(complete)
 
     @contextmanager
     def _whole_only_if_written(self) -> Iterator[None]:
@@ -174,28 +249,63 @@ class RunFolder:
                     f"{self._folder}: another process records a run in it; must end first, or --out"
                     " be another folder"
                 )
-            if settings.is_file() and any(
-                (self._place / name).is_file() for name in (SIGNALS, ARROW)
-            ):
+            if _is_of_a_run(self._place):
                 remove(self._place, *DRAWN, *of_any_format(ANY_PICTURE, *_groups(settings)))
             remove(self._place, SETTINGS, SIGNALS, ARROW)
-            if self._signals:
-                self._file.begin(self._experiment, self._signals)
+            _remove_windows(self._place)
             self._begun = True
-            self._write(steps, rows)
-            of, columns = self._signals, rows[:1].T
-            begun = RecordedRun(
-                self._experiment.settings, self._experiment.times(steps[:1]),
-                {s.name: typed(s, column) for s, column in zip(of, columns, strict=True)},
-                {s.name: s.unit for s in of}, None, False, {s.name: s.description for s in of},
-                to_si=self._to_si, of_every_step=OfEveryStep(Measured({}, (), ()), {}),
-            )  # fmt: skip
+            begun = self._begun_run(steps, rows)
+            if self._is_triggered:
+                begun = replace(begun, steps_done=0)
+            elif self._signals:
+                self._open_file()
+                self._write(steps, rows)
             self._write_settings(begun)
         except OSError as error:
             path = Path(error.filename or self._place)
             if path.is_relative_to(self._place):
                 path = self._folder / path.relative_to(self._place)
             raise InputError(unwritable(path, error)) from error
+
+    def _begun_run(
+        self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]
+    ) -> RecordedRun:
+        """What is known as the first of these rows comes, of which there may be none."""
+        of, columns = self._signals, rows[:1].T
+        return RecordedRun(
+            self._experiment.settings, self._experiment.times(steps[:1]),
+            {s.name: typed(s, column) for s, column in zip(of, columns, strict=True)},
+            {s.name: s.unit for s in of}, None, False, {s.name: s.description for s in of},
+            to_si=self._to_si, of_every_step=OfEveryStep(Measured({}, (), ()), {}),
+        )  # fmt: skip
+
+
+def window_folders(folder: Path) -> list[Path]:
+    """The folders of the windows of a triggered run in its folder, in their order."""
+    return [path for path in _called_windows(folder) if "window" in (_older(path) or {})]
+
+
+def _called_windows(folder: Path) -> list[Path]:
+    """The folders in a folder that have the names of windows, in the order of their numbers."""
+    folders = [path for path in folder.glob("window_*") if WINDOW.fullmatch(path.name)]
+    return sorted(
+        (path for path in folders if path.is_dir()),
+        key=lambda path: int(path.name.removeprefix("window_")),
+    )
+
+
+def _remove_windows(place: Path) -> None:
+    """Remove the windows of an older run, and what a kill left of one.
+
+    Another run in a folder of such a name, and what else is in their folders, stays.
+    """
+    for folder in _called_windows(place):
+        if (folder / SETTINGS).is_file() and "window" not in (_older(folder) or {}):
+            continue
+        pictures = of_any_format(ANY_PICTURE, *_groups(folder / SETTINGS))
+        remove(folder, SETTINGS, *DRAWN, *pictures, SIGNALS, ARROW)
+        if not folder.is_symlink() and not any(folder.iterdir()):
+            folder.rmdir()
 
 
 def save_run(result: RecordedRun, folder: Path, form: Form) -> None:
@@ -205,10 +315,32 @@ def save_run(result: RecordedRun, folder: Path, form: Form) -> None:
         into.finish(result)
 
 
-class GroupsOfRun(TypedDict, total=False):
-    """What _groups() reads of run.json."""
+class OlderRun(TypedDict, total=False):
+    """What is read of the run.json of an older run."""
 
     metrics: list[str]
+    windows: list[Any]
+    window: Mapping[str, Any]
+
+
+def _is_of_a_run(folder: Path) -> bool:
+    """True if a folder has the files of a run, and not only a run.json of something else."""
+    if not (folder / SETTINGS).is_file():
+        return False
+    has_rows = any((folder / name).is_file() for name in (SIGNALS, ARROW))
+    return has_rows or "windows" in (_older(folder) or {})
+
+
+def _older(folder: Path) -> OlderRun | None:
+    """What the run.json in a folder says, nothing where there is none; None if it is damaged."""
+    settings = folder / SETTINGS
+    if not settings.is_file():
+        return {}
+    try:
+        content = json_in(str(settings), settings.read_bytes())
+        return Decoder().decoded(OlderRun, str(settings), content)
+    except InputError:
+        return None
 
 
 def _groups(settings: Path) -> Sequence[str]:
@@ -216,11 +348,8 @@ def _groups(settings: Path) -> Sequence[str]:
 
     All that there are where it is damaged.
     """
-    try:
-        content = json_in(str(settings), settings.read_bytes())
-        return Decoder().decoded(GroupsOfRun, str(settings), content).get("metrics", [])
-    except InputError:
-        return names("groups")
+    older = _older(settings.parent) if settings.is_file() else None
+    return names("groups") if older is None else older.get("metrics", [])
 
 
 def now() -> datetime:

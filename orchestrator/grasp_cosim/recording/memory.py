@@ -15,7 +15,7 @@ import numpy.typing as npt
 from ..base.errors import InputError, SimulationError
 from ..base.files import unwritable
 from ..base.system_calls import memory
-from ..exchange.listener import Experiment, Signal
+from ..exchange.listener import Experiment, Signal, Window
 
 BEYOND = 2.0**63
 """From this magnitude on an int64 holds no whole number."""
@@ -155,19 +155,23 @@ class MemoryListener:
         return self._experiment.times(steps), {s.name: typed(s, c) for s, c in by_signal}
 
 
-class EveryRow:
-    """Keeps signals at every step of a thinned run, for its metrics, in a temporary file.
+class _RowsInFile:
+    """Rows in a temporary file, one after the other.
 
     `lost` says why they are not kept any more, as on a full disk: the run goes on.
     """
 
-    def __init__(self, names: Collection[str]) -> None:
-        self.names, self._rows, self.lost = names, 0, ""
+    _width: int
+    """The values of a row."""
+
+    def __init__(self) -> None:
+        self._rows, self.lost = 0, ""
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
-        """Open the file, in which a row comes after the other."""
+        """Open the file."""
         self._experiment = experiment
         self._signals = tuple(signals)
+        self._width = len(signals)
         self._open()
 
     def _open(self, rows: int = 0) -> None:
@@ -176,7 +180,7 @@ class EveryRow:
         finalize(self._storage, file.close)
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
-        """Write what these rows have of the signals."""
+        """Write the rows."""
         unwritten = memoryview(b"" if self.lost else rows.tobytes())
         try:
             while unwritten:
@@ -189,15 +193,15 @@ class EveryRow:
     def end(self, complete: bool) -> None:
         """The file goes with the last name of it."""
 
-    def saved(self) -> "tuple[_Storage[Any], int]":
+    def saved(self) -> tuple[Any, ...]:
         """What was kept until now, for restore()."""
         self._storage.share(self._rows)
         return self._storage, self._rows
 
-    def restore(self, saved: "tuple[_Storage[Any], int]") -> None:
+    def restore(self, saved: tuple[Any, ...]) -> None:
         """Go back to what was saved; other states stay."""
         self._storage, self._rows = saved
-        size = 8 * self._rows * len(self._signals)
+        size = 8 * self._rows * self._width
         if self.lost:
             return
         if self._rows < self._storage.shared_rows:
@@ -207,17 +211,92 @@ class EveryRow:
             self._storage.medium.write(rows)
         self._storage.medium.seek(size)
 
+    def _table(self) -> npt.NDArray[np.float64]:
+        """All rows so far, mapped from the file."""
+        shape = 0 if self.lost else self._rows, self._width
+        if not all(shape):
+            return np.empty(shape)
+        return np.memmap(self._storage.medium, np.float64, "r", shape=shape)
+
+
+class EveryRow(_RowsInFile):
+    """Keeps signals at every step of a run that records fewer, for its metrics."""
+
+    def __init__(self, names: Collection[str]) -> None:
+        super().__init__()
+        self.names = names
+
     def columns(self) -> Columns:
-        """All communication points in s so far, and the columns, mapped from the file."""
-        shape = self._rows, len(self._signals)
-        table = (
-            np.memmap(self._storage.medium, np.float64, "r", shape=shape)
-            if all(shape)
-            else np.empty(shape)
-        )
-        by_signal = zip(self._signals, table.T, strict=True)
+        """All communication points in s so far, and the columns."""
+        by_signal = zip(self._signals, self._table().T, strict=True)
         times = self._experiment.times(np.arange(self._rows))
         return times, {s.name: typed(s, column) for s, column in by_signal}
+
+
+class WindowRows(_RowsInFile):
+    """Keeps the rows of a triggered run, behind their steps, and where its windows begin.
+
+    So their memory does not grow with the time of the run.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._windows: list[tuple[Window, int]] = []
+
+    def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
+        """Open the file."""
+        super().begin(experiment, signals)
+        self._width = 1 + len(signals)
+
+    def begin_run(self) -> None:
+        """Nothing is kept yet."""
+
+    def begin_window(self, window: Window) -> None:
+        """Note where it begins."""
+        self._windows.append((window, self._rows))
+
+    def end_window(self, window: Window) -> None:
+        """Note what it came to."""
+        self._windows[-1] = window, self._windows[-1][1]
+
+    def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+        """Write the rows behind their steps, which a float64 holds exactly."""
+        super().block(steps, np.column_stack((steps, rows)))
+
+    def saved(self) -> tuple[Any, ...]:
+        """What was kept until now, for restore()."""
+        return super().saved(), tuple(self._windows)
+
+    def restore(self, saved: tuple[Any, ...]) -> None:
+        """Go back to what was saved; other states stay."""
+        rows, windows = saved
+        super().restore(rows)
+        self._windows = [*windows]
+
+    def start_over(self) -> None:
+        """Give up all rows."""
+        self._rows, self._windows = 0, []
+        self._open()
+
+    def columns(self, next_row: Rows | None = None) -> Columns:
+        """As MemoryListener.columns()."""
+        table = self._table()
+        steps = table[:, 0].astype(np.int64)
+        table = table[:, 1:]
+        if next_row:
+            steps, table = np.append(steps, next_row[0]), np.append(table, next_row[1], axis=0)
+        by_signal = zip(self._signals, table.T, strict=True)
+        return self._experiment.times(steps), {s.name: typed(s, c) for s, c in by_signal}
+
+    def windows(self, count: int) -> list[tuple[Window, slice]]:
+        """The windows until now, and where their rows are in so many."""
+        if self.lost:
+            return []
+        ends = [*(begin for _, begin in self._windows[1:]), count]
+        return [
+            (window, slice(begin, end))
+            for (window, begin), end in zip(self._windows, ends, strict=False)
+        ]
 
 
 def typed(signal: Signal, column: npt.NDArray[np.float64]) -> npt.NDArray[Any]:

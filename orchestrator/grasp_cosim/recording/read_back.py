@@ -14,11 +14,12 @@ from ..base.errors import InputError, choices
 from ..base.files import check_nature
 from ..base.si_units import known_unit
 from ..base.text import counted
+from ..exchange.listener import Window
 from ..interface.units import Conversion
 from ..metrics.groups import metrics_of
 from ..metrics.metric import Measured, Metric, Signals, resolved
 from ..realtime.timing import Timing
-from .folder import ARROW, SETTINGS, SIGNALS
+from .folder import ARROW, SETTINGS, SIGNALS, window_folders
 from .log_names import AS_THEY_ARE, LogNames
 from .recorded_run import OfEveryStep, Rejection, Trip
 from .result import Result
@@ -33,6 +34,8 @@ TEXT = "str"
 TYPES = ("float64", "int32", "int64", "bool", TEXT)
 """The element types of recorded columns, the last that of Strings."""
 
+_ELEMENTS = {name: np.dtype(object if name == TEXT else name) for name in TYPES}
+
 
 def run_folder(path: Path) -> Path:
     """The folder of a run, which one of its files names too; InputError where it is none."""
@@ -46,7 +49,8 @@ def load_run(folder: str | Path) -> Result:
     """Read the result in a folder that `run --out` wrote, or is writing: then as far as it got.
 
     Metrics are worked out again from the signals; those of a user's file, and of a run that
-    recorded only some of its steps or its signals, are as they were recorded.
+    recorded only some of its steps or its signals, are as they were recorded. A triggered run has
+    its windows as further results.
 
     Args:
         folder: The folder, or one of its files.
@@ -67,6 +71,8 @@ def load_run(folder: str | Path) -> Result:
     path, arrow, signals = folder / SETTINGS, folder / ARROW, folder / SIGNALS
     report = read_run_json(path)
     units, types = report["units"], report.get("types", {})
+    if "windows" in report:
+        return _triggered(report, folder)
     if not units and not arrow.exists() and not signals.exists():
         raise InputError(f"{path}: this run recorded no signal; must have recorded one")
     rows = arrow if arrow.exists() else signals
@@ -90,6 +96,30 @@ def load_run(folder: str | Path) -> Result:
     _check_rows(rows, read, report)
     in_part = read.every > 1 or "record" in report
     return _with_figures_of_every_step(read, report) if in_part else read
+
+
+def _triggered(report: RunJson, folder: Path) -> Result:
+    """The result of a triggered run, with the rows of its windows."""
+    windows = [load_run(path) for path in window_folders(folder)]
+    listed = report.get("windows", [])
+    if len(windows) < len(listed):
+        raise InputError(
+            f"{folder}: is damaged: has {counted(len(windows), 'window')}; must have "
+            f"{len(listed)}, as {SETTINGS} says"
+        )
+    types = report.get("types", {})
+    empty = {name: np.empty(0, _ELEMENTS[types.get(name, "float64")]) for name in report["units"]}
+    signals = {
+        name: np.concatenate([column, *(window[name] for window in windows)])
+        for name, column in empty.items()
+    }
+    time = np.concatenate([np.empty(0), *(window.time for window in windows)])
+    read = replace(
+        _result_of(report, folder, time, signals),
+        windows=tuple(windows),
+        steps_done=report["steps"],
+    )
+    return _with_figures_of_every_step(read, report)
 
 
 def _result_of(
@@ -121,6 +151,7 @@ def _result_of(
         limits=tuple(Trip(**trip) for trip in report.get("exceeded", ())),
         initialised_anew=tuple(report.get("initialised_anew", ())),
         peers=report.get("peers", {}),
+        window=Window(**report["window"]) if "window" in report else None,
     )
 
 
@@ -128,7 +159,7 @@ def _check_rows(path: Path, read: Result, written: Mapping[str, Any]) -> None:
     """InputError where rows are missing of a run that came to its end, whatever end that was."""
     if read.wall_time is None and not read.complete:  # it goes on, or was killed
         return
-    if read.wall_time is None:
+    if read.wall_time is None and not read.window:
         raise InputError(
             f"{path.with_name(SETTINGS)}: wall_time = None; must be a number, as it is complete"
         )
@@ -144,6 +175,8 @@ def _with_figures_of_every_step(read: Result, written: Mapping[str, Any]) -> Res
     """A result of some rows or signals with the metrics that run.json has, which are of all."""
     metrics, measured = metrics_of(read.groups, read.more_metrics), written["measured"]
     worked_out = tuple(m for m in metrics if m.name in measured)
+    if not worked_out and metrics and read.is_triggered:
+        return replace(read, of_every_step=OfEveryStep.without(read.time, read.signals))
     if not worked_out and metrics and read.every > 1:  # it did not come to its end
         line = f"one row in {read.every} was recorded: the metrics are of these"
         return replace(read, log=(*read.log, line))

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from ..base.by_name import ByName
 from ..base.errors import UnknownNameError
 from ..base.files import write_json
-from ..exchange.listener import Experiment, Listener, Signal
+from ..exchange.listener import Experiment, Listener, OfWindows, Signal, Window
 from ..interface.units import Conversion
 from ..metrics.groups import metrics_of
 from ..metrics.metric import Measured, Metric, Signals, Value, measure
@@ -24,7 +24,7 @@ from ..system.parts import Component
 from ..system.settings import given_values
 from ..system.times import NANOSECONDS, nearest_time
 from .proxies import proxy_figures
-from .verdict import Criterion, judge
+from .verdict import Verdict, judge
 
 KINDS = {"f": "Real", "i": "Integer", "b": "Boolean", "O": "String"}
 """The kind of a signal by the kind of its column's element type."""
@@ -98,6 +98,14 @@ class OfEveryStep:
     measured: Measured
     proxies: Mapping[str, Any]
 
+    @classmethod
+    def without(
+        cls, time: npt.NDArray[np.float64], signals: Mapping[str, npt.NDArray[Any]]
+    ) -> OfEveryStep:
+        """Those of a triggered run of which only the rows of its windows are there: no metrics."""
+        line = "metrics of the run: none, as only the rows of windows are there"
+        return cls(Measured({}, (), (line,)), proxy_figures(time, signals))
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RecordedRun(ByName[npt.NDArray[Any]]):
@@ -154,6 +162,12 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
     """The times in s at which the whole loop was initialised again, as a lost peer was back."""
     peers: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     """By component that is a proxy, the name and the build of its last peer."""
+    windows: tuple[RecordedRun, ...] = ()
+    """The windows of a triggered run, each a result; the rows of the run are theirs, with gaps."""
+    window: Window | None = None
+    """Which window of a triggered run it is; None of a whole run."""
+    steps_done: int | None = None
+    """The steps of a triggered run, as its rows do not tell them; None of any other."""
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         """A signal of the run.
@@ -211,12 +225,29 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
     @property
     def every(self) -> int:
         """The steps from one row to the next: more than 1 where the recording was thinned."""
+        if self.windows:
+            return max(window.every for window in self.windows)
         return int(self._steps[1] - self._steps[0]) if len(self.time) > 1 else 1
 
     @property
     def last_step(self) -> int:
-        """The number of the step at whose end the last row is, counted from the start."""
-        return int(self._steps[-1])
+        """The number of the step at whose end the last row is, counted from the start.
+
+        Of a triggered run that of the last step.
+        """
+        return int(self._steps[-1]) if self.steps_done is None else self.steps_done
+
+    @property
+    def is_triggered(self) -> bool:
+        """True of a triggered run: it recorded windows, with gaps between them."""
+        return self.steps_done is not None
+
+    @property
+    def end_time(self) -> float:
+        """The time in s of that step."""
+        if self.steps_done is None:
+            return float(self.time[-1])
+        return float(Experiment.of(self.settings).times(np.array([self.steps_done]))[0])
 
     @property
     def numbers(self) -> dict[str, npt.NDArray[Any]]:
@@ -241,7 +272,7 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
     def _figures(self) -> Figures:
         """The metrics without those that fail."""
         every_step, wall_time, settings = self.of_every_step, self.wall_time, self.settings
-        simulated = float(self.time[-1]) - settings.get("start", 0.0)
+        simulated = self.end_time - settings.get("start", 0.0)
         proxies = every_step.proxies if every_step else proxy_figures(self.time, self.signals)
         figures = Figures(self.measured.values)
         figures["wall_time"] = wall_time
@@ -257,16 +288,23 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
         return figures
 
     @cached_property
-    def verdict(self) -> tuple[Criterion, ...]:
-        """The criteria of a run with a bench, in real time or with limits; none of any other."""
+    def verdict(self) -> Verdict:
+        """The criteria of a run with a bench, in real time, with limits, or with limits of its
+        metrics; none of any other, nor of a window. It prints as those that failed.
+        """
+        if self.window:
+            return Verdict()
+        has_steps = len(self.time) or self.steps_done
         return judge(
             self.settings,
-            self.last_step if len(self.time) else 0,
+            self.last_step if has_steps else 0,
             self._figures.get("proxies", {}),
             self.timing,
             len(self.limits),
             len(self.initialised_anew),
             self.came_to_its_end,
+            self.measured.columns(),
+            self.measured.units,
         )
 
     @property
@@ -323,7 +361,53 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
             report["peers"] = {name: dict(peer) for name, peer in self.peers.items()}
         if self.verdict:
             report["verdict"] = [criterion.as_dict() for criterion in self.verdict]
+        if self.window:
+            report["window"] = asdict(self.window)
+        if self.is_triggered:
+            report["windows"] = [window.summary for window in self.windows]
         return report | dict(self.origin)
+
+    @property
+    def subfolder(self) -> str:
+        """The name of its folder in that of its run; "" of a whole run, which has that one."""
+        return self.window.folder if self.window else ""
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """What is known of a window, as run.json of its run has it; times in s."""
+        of_window = asdict(self.window) if self.window else {}
+        begin, end = (float(self.time[i]) for i in (0, -1))
+        rows = {"from": begin, "until": end, "rows": len(self.time)}
+        return {"folder": self.subfolder, **of_window, **rows}
+
+    def part(self, window: Window, rows: slice) -> Self:
+        """The result of a window. It is complete if the run has not broken off in it.
+
+        Args:
+            window: The window.
+            rows: Where its rows are in those of the run.
+
+        Returns:
+            The rows, and what is known of them.
+        """
+        when = self.settings["trigger"]["when"]
+        return replace(
+            self,
+            time=self.time[rows],
+            signals={name: column[rows] for name, column in self.signals.items()},
+            wall_time=None,
+            complete=window.complete or self.came_to_its_end,
+            window=replace(window, complete=window.complete or self.came_to_its_end),
+            log=(f"t = {window.time:.9g} s: recording {window.number}: {when}",),
+            rejections={},
+            timing=None,
+            of_every_step=None,
+            ended_at=None,
+            limits=(),
+            initialised_anew=(),
+            windows=(),
+            steps_done=None,
+        )
 
     def titled(self, title: str) -> Self:
         """The result under another title, which its pictures and pages have.
@@ -357,14 +441,25 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
         with ExitStack() as stack:
             listener.begin(Experiment.of(self.settings), signals)
             stack.callback(listener.end, self.complete)
-            for first in range(0, len(self.time), PIECE):
-                steps = self._steps[first : first + PIECE]
-                rows = np.empty((len(steps), len(signals)))
-                for i, (signal, column) in enumerate(zip(signals, self.values(), strict=True)):
-                    values = column[first : first + PIECE]
-                    text = signal.kind == "String"
-                    rows[:, i] = [*map(signal.texts.number, values)] if text else values
-                listener.block(steps, rows)
+            if not self.is_triggered or not isinstance(listener, OfWindows):
+                self._replay_rows(listener, signals)
+                return
+            listener.begin_run()
+            for part in self.windows:
+                if part.window:
+                    listener.begin_window(part.window)
+                    part._replay_rows(listener, signals)
+                    listener.end_window(part.window)
+
+    def _replay_rows(self, listener: Listener, signals: Sequence[Signal]) -> None:
+        for first in range(0, len(self.time), PIECE):
+            steps = self._steps[first : first + PIECE]
+            rows = np.empty((len(steps), len(signals)))
+            for i, (signal, column) in enumerate(zip(signals, self.values(), strict=True)):
+                values = column[first : first + PIECE]
+                text = signal.kind == "String"
+                rows[:, i] = [*map(signal.texts.number, values)] if text else values
+            listener.block(steps, rows)
 
 
 def _type_name(column: npt.NDArray[Any]) -> str:

@@ -10,7 +10,7 @@ from ..base.checks import extra_module, is_number
 from ..base.errors import choices
 from ..base.one_piece import in_one_piece
 from ..base.registry import registered
-from ..base.text import on_a_screen
+from ..base.text import counted, on_a_screen
 from ..exchange.listener import Listener
 from ..metrics.groups import group_of
 from ..metrics.metric import Metric
@@ -66,6 +66,9 @@ class Result(RecordedRun):
         >>> bool(result["plant.gap[1]"].min() > 0.0)
         True
     """
+
+    if TYPE_CHECKING:
+        windows: tuple[Result, ...]
 
     def __repr__(self) -> str:
         """The system, its settings, metrics and signals in five lines."""
@@ -180,7 +183,7 @@ class Result(RecordedRun):
         settings, rows = self.settings, len(self.time)
         source = f", read from {self.folder}" if self.folder else ""
         yield f"Result of {settings['system']}{source}"
-        end = f"{self.time[-1]:.6g} s of " if rows and not self.complete else ""
+        end = f"{self.end_time:.6g} s of " if rows and not self.complete else ""
         duration = f", took {self.wall_time:.3g} s" if self.wall_time else ""
         broken = "" if self.complete else ", not complete"
         if self.ended_at is not None:
@@ -188,7 +191,8 @@ class Result(RecordedRun):
         step, stop = 1e3 * settings["step"], settings["stop"]
         scheme = f"in steps of {step:.6g} ms, {settings['scheme']}"
         yield f"  run      {end}{stop:.6g} s {scheme}{duration}{broken}"
-        yield f"  signals  {len(self)}, of {rows} rows: {choices(self, FEW)}"
+        windows = f" in {counted(len(self.windows), 'window')}" if self.is_triggered else ""
+        yield f"  signals  {len(self)}, of {rows} rows{windows}: {choices(self, FEW)}"
         metrics = (_in_words(m, self.measured.values[m.name]) for m in self.measured.metrics)
         yield f"  metrics  {'; '.join([*metrics][:FEW]) or 'none'}"
         yield f"  log      {choices(self.log, 1) if self.log else 'nothing to report'}"

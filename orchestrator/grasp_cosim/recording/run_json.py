@@ -153,6 +153,21 @@ class LimitEntry(TypedDict):
     then: str
 
 
+class TriggerEntry(TypedDict):
+    """When the run is recorded: system.record.Trigger."""
+
+    when: str
+    before: TimeInS
+    after: TimeInS
+
+
+class BoundsEntry(TypedDict, total=False):
+    """The limits of a metric: system.parts.MetricLimit."""
+
+    low: Number | None
+    high: Number | None
+
+
 class AcceptanceEntry(TypedDict, total=False):
     """What the run may come to and still pass: system.parts.Acceptance."""
 
@@ -167,6 +182,7 @@ class AcceptanceEntry(TypedDict, total=False):
     refused: Number
     warnings: Number
     unfinished: Number
+    metrics: Mapping[str, BoundsEntry]
 
 
 class Made(TypedDict):
@@ -193,6 +209,7 @@ class MadeBeside(TypedDict, total=False):
     diverging: str
     start: TimeInS
     record: list[str]
+    trigger: TriggerEntry
     realtime: Mapping[str, Setting | None]
     limits: list[LimitEntry]
     acceptance: AcceptanceEntry
@@ -254,6 +271,15 @@ class ExceededEntry(TypedDict):
     steps: Count
 
 
+class WindowEntry(TypedDict):
+    """Which window of a triggered run it is: exchange.listener.Window."""
+
+    number: Count
+    time: TimeInS
+    times: Count
+    complete: bool
+
+
 class Beside(TypedDict, total=False):
     """More that is known of it; all of it may be missing."""
 
@@ -269,6 +295,8 @@ class Beside(TypedDict, total=False):
     initialised_anew: list[Number]
     peers: Mapping[str, Mapping[str, str]]
     verdict: list[Mapping[str, Any]]
+    window: WindowEntry
+    windows: list[Mapping[str, Any]]
 
 
 class RunJson(Made, MadeBeside, Origin, OfTheRun, Beside):

@@ -19,6 +19,9 @@ EXPERIMENT = (
 )  # fmt: skip
 """Entries of run.json that say how the run was made, in the order in which they are shown."""
 
+PAGE = "report.html"
+"""The page of a run, in its folder."""
+
 _EXPERIMENT_UNITS = {"step": "s", "stop": "s", "wall_time": "s"}
 
 
@@ -145,6 +148,19 @@ def _experiment_html(run: Mapping[str, Any], origin: Mapping[str, Any]) -> str:
     return table("", rows)
 
 
+def windows_html(result: Result) -> str:
+    """A row for each window of a triggered run: when its trigger came true, and what it has."""
+    rows = []
+    for window in (part.summary for part in result.windows):
+        times = [number(window[key]) for key in ("time", "from", "until")]
+        cells = [window["folder"], *times, grouped(window["rows"])]
+        rows.append("".join(map(cell, cells)))
+    condition = escape(result.settings["trigger"]["when"])
+    hint = f'<p class="hint">In windows around the points at which {condition} became true.</p>'
+    heads = "<th>folder</th><th>trigger in s</th><th>from</th><th>until</th><th>rows</th>"
+    return table(heads, rows) + hint
+
+
 def protocol_html(result: Result) -> str:
     """The verdict on a run, criterion by criterion, and what was tested: FMUs and peers."""
     failed = [criterion for criterion in result.verdict if not criterion.passed]
@@ -161,10 +177,13 @@ def _criteria_html(result: Result) -> str:
     rows = []
     for criterion in result.verdict:
         verdict = "pass" if criterion.passed else "fail"
+        measured = "no value"
+        if criterion.measured is not None:
+            measured = f"{number(criterion.measured)} {criterion.unit}"
         rows.append(
             cell(criterion.what)
-            + cell(f"at most {number(criterion.limit)} {criterion.unit}", data_head="limit")
-            + cell(f"{number(criterion.measured)} {criterion.unit}", data_head="measured")
+            + cell(criterion.must, data_head="limit")
+            + cell(measured, data_head="measured")
             + cell(verdict, data_head="verdict", class_=verdict)
         )
     return table("<th>criterion</th><th>limit</th><th>measured</th><th>verdict</th>", rows, "cards")

@@ -21,7 +21,15 @@ from ..recording.csv import quoted
 from ..recording.read_back import load_run
 from ..recording.result import Result
 from .embed import MAX_VALUES, Excerpt, excerpt_of
-from .html_tables import metrics_html, protocol_html, settings_html, summary, svg_button
+from .html_tables import (
+    PAGE,
+    metrics_html,
+    protocol_html,
+    settings_html,
+    summary,
+    svg_button,
+    windows_html,
+)
 from .plot import main_signals
 from .system_html import connections_svg
 from .timing_chart import TIMING_STEM, draw_pictures, timing_html
@@ -29,6 +37,7 @@ from .traces_page import (
     Scene,
     columns_html,
     log_times,
+    plain_page,
     scripts,
     signal_styles,
     traces_html,
@@ -47,6 +56,8 @@ def write_report(
 ) -> list[Path]:
     """Write a page on a run, and the pictures of it.
 
+    The page of a triggered run has no traces: each of its windows in a folder gets its own page.
+
     Args:
         run: The result, or the folder or file of one that load_run() reads.
         out: The file of the page; by default report.html in the folder of the run, or in the
@@ -55,7 +66,7 @@ def write_report(
 
     Returns:
         The paths of the page and, with matplotlib, of its picture and of the timing of a run in
-        real time.
+        real time; then those of windows.
 
     Raises:
         InputError: The folder has no run, or the page cannot be written.
@@ -69,12 +80,12 @@ def write_report(
     result = run if isinstance(run, Result) else load_run(run)
     result = result.titled(title)
     folder = result.folder or Path()
-    page = Path(out) if out else folder / "report.html"
-    if result.folder and result.wall_time is None:
-        LOGGER.warning("%s: unfinished, to t = %.6g s", folder, result.time[-1])
+    page = Path(out) if out else folder / PAGE
+    if result.folder and result.wall_time is None and not result.complete:
+        LOGGER.warning("%s: unfinished, to t = %.6g s", folder, result.end_time)
     check_file(page)
     remove_parts(page.parent, page.name, *of_any_format(result.view.stem, TIMING_STEM))
-    write_page(result, page, scene=result.view.scene(result))
+    write_page(result, page, scene=None if result.is_triggered else result.view.scene(result))
     files = [page]
     if is_stream(page):
         return files
@@ -82,6 +93,9 @@ def write_report(
         files += draw_pictures(result, page.parent)
     except InputError as error:
         LOGGER.warning("no picture: %s", error)
+    for window in result.windows:
+        if window.folder:
+            files += write_report(window)
     return files
 
 
@@ -97,6 +111,8 @@ def write_page(
 
 def page_html(result: Result, *, scene: Scene | None = None, max_values: int = MAX_VALUES) -> str:
     """Return the page as text, see write_page."""
+    if result.is_triggered:
+        return plain_page(caption(result), summary(result.metrics), _sections_of_windows(result))
     columns = {name: _numbers(column) for name, column in result.items()}
     excerpt = excerpt_of(result.time, columns, max_values)
     heading = caption(result)
@@ -114,17 +130,31 @@ def page_html(result: Result, *, scene: Scene | None = None, max_values: int = M
 
 def _sections(result: Result, excerpt: Excerpt, scene: Scene | None) -> dict[str, tuple[str, str]]:
     """The sections of the page by their ids, each its head and its HTML."""
-    sections = {}
-    if result.verdict:
-        sections["protocol"] = "Test protocol", protocol_html(result)
-    if scene:
-        sections["scene"] = scene.title, scene.html
-    sections["traces"] = "Traces", _traces_html(result, excerpt, scene)
-    sections["metrics"] = "Metrics", metrics_html(result)
-    if result.timing:
-        sections["timing"] = "Real time", timing_html(result.timing, float(result.time[-1]))
+    traces = {"traces": ("Traces", _traces_html(result, excerpt, scene))}
+    of_scene = {"scene": (scene.title, scene.html)} if scene else {}
+    sections = _protocol(result) | of_scene | traces | _figures(result)
     sections["connections"] = "Connections", _connections_html(result)
     sections["settings"] = "Settings", settings_html(result)
+    return sections
+
+
+def _sections_of_windows(result: Result) -> dict[str, tuple[str, str]]:
+    """Those of a triggered run: its windows are in the place of traces."""
+    windows = {"windows": ("Windows", windows_html(result))}
+    settings = {"settings": ("Settings", settings_html(result))}
+    return _protocol(result) | windows | _figures(result) | settings
+
+
+def _protocol(result: Result) -> dict[str, tuple[str, str]]:
+    """The section with the verdict, where there is one."""
+    return {"protocol": ("Test protocol", protocol_html(result))} if result.verdict else {}
+
+
+def _figures(result: Result) -> dict[str, tuple[str, str]]:
+    """The sections with the metrics and the timing."""
+    sections = {"metrics": ("Metrics", metrics_html(result))}
+    if result.timing:
+        sections["timing"] = "Real time", timing_html(result.timing, result.end_time)
     return sections
 
 

@@ -14,6 +14,8 @@ def run_json(result: Result) -> dict[str, Any]:
     entries: dict[str, Any] = {**result.metrics, "units": result.metric_units}
     if result.verdict:
         entries["verdict"] = [criterion.as_dict() for criterion in result.verdict]
+    if result.is_triggered:
+        entries["windows"] = [window.summary for window in result.windows]
     if result.measured.missing:
         entries["missing_metrics"] = list(result.measured.missing)
     if result.timing:
@@ -33,6 +35,9 @@ def run_text(result: Result) -> str:
         numbers = _numbers(metrics[metric.name], metric.factor)
         lines.append(f"{metric.title:22s}{numbers} {metric.display_unit}".rstrip())
     lines += result.measured.missing
+    if result.is_triggered:
+        windows, rows = len(result.windows), len(result.time)
+        lines.append(f"{'recorded':22s}{counted(rows, 'row')} in {counted(windows, 'window')}")
     if result.verdict:
         failed = [criterion for criterion in result.verdict if not criterion.passed]
         outcome = f"failed {len(failed)} of" if failed else "passed all"

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..base.errors import InputError
+from ..base.files import make_folder
 from ..base.text import grouped
 from ..realtime.timing import Histogram, Spread, Timing
 from ..recording.result import Result
@@ -66,14 +67,16 @@ MAX_OVERRUN_ROWS = 50
 def draw_pictures(result: Result, folder: Path, suffix: str = "png") -> Iterator[Path]:
     """Draw the picture of a result, and the timing if it was paced; yield each once it is drawn.
 
-    `suffix` is one of files.PICTURES.
+    A triggered run has none, but each of its windows. `suffix` is one of files.PICTURES.
     """
-    picture = folder / f"{result.view.stem}.{suffix}"
-    result.plot(picture)
-    yield picture
+    make_folder(folder)
+    if not result.is_triggered:
+        picture = folder / f"{result.view.stem}.{suffix}"
+        result.plot(picture)
+        yield picture
     if result.timing:
         picture = folder / f"{TIMING_STEM}.{suffix}"
-        draw_timing(result.timing, float(result.time[-1]), picture, caption(result))
+        draw_timing(result.timing, result.end_time, picture, caption(result))
         yield picture
 
 

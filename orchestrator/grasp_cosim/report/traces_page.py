@@ -82,6 +82,31 @@ def traces_page(
         script: The scripts that come between those of the traces and main.js.
         style: What comes after the style that all pages have.
     """
+    return _page(
+        caption,
+        summary,
+        sections,
+        json.dumps(state).replace("<", "\\u003c"),  # cannot end its script element
+        data,
+        "\n".join([traces_script(), *script, scripts("main")]),
+        style,
+    )
+
+
+def plain_page(caption: Caption, summary: str, sections: Mapping[str, tuple[str, str]]) -> str:
+    """Return a page without traces as text; its parts are as of traces_page()."""
+    return _page(caption, summary, sections)
+
+
+def _page(
+    caption: Caption,
+    summary: str,
+    sections: Mapping[str, tuple[str, str]],
+    state: str = "{}",
+    data: str = "",
+    script: str = "",
+    style: str = "",
+) -> str:
     links = "".join(f'<a href="#{name}">{head}</a>' for name, (head, _) in sections.items())
     elements = [
         f'<section id="{name}">\n<h2>{head}</h2>\n{html}\n</section>'
@@ -95,9 +120,9 @@ def traces_page(
         contents=links,
         sections="\n".join(elements),
         version=escape(version("grasp-cosim")),
-        page=json.dumps(state).replace("<", "\\u003c"),  # cannot end its script element
+        page=state,
         data=data,
-        script="\n".join([traces_script(), *script, scripts("main")]),
+        script=script,
     )
 
 

@@ -85,7 +85,7 @@ def sweep(
         >>> [round(float(force), 2) for force in table["steady_contact_force[1]"]]
         [2.09, 3.39]
     """
-    system = as_system(system, "sweep")
+    system = as_system(system, "sweep").untriggered()
     for component in system.components:
         if component.trace:
             raise InputError(

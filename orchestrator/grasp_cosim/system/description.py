@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 import operator
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, overload
+from typing import Any, Literal, overload
 
 from ..base.errors import InputError, nearest
 from ..base.files import check_nature
@@ -14,10 +15,10 @@ from ..base.registry import check_registered, registered
 from ..interface.values import Given, parse_value
 from .changes import with_own_values
 from .connectors import behind_connectors, check_connectors, driven_by_connectors
-from .entries import sections, with_overrides
+from .entries import sections, with_overrides, with_trigger
 from .from_python import Part, from_sections
 from .names import in_main_names
-from .overrides import PLACE, SECTIONS, Override, Overrides, as_overrides, grouped
+from .overrides import PLACE, RECORD, SECTIONS, Override, Overrides, as_overrides, grouped
 from .parameters import Parameters, parameters_of
 from .parts import Component, Connection
 from .record import Record
@@ -37,6 +38,9 @@ from .validity import (
     check_steps,
     check_stimuli,
 )
+
+LOGGER = logging.getLogger(__name__)
+"""Gets what a system does without."""
 
 ARCHIVE = ".ssp"
 
@@ -346,7 +350,8 @@ class System(Structure):
         attributes = sections(self, groups.sections)
         if not groups.components and all(getattr(self, n) == v for n, v in attributes.items()):
             return self  # as where the reader of an archive has taken the times
-        record, missing = self.record.without_missing(self.components, changed, self.outputs)
+        record: Record = attributes.pop("record")
+        record, missing = record.without_missing(self.components, changed, self.outputs)
         for text in missing:
             notes.append(f"record: {text!r} matches no signal any more: it is left out")
         return replace(
@@ -396,27 +401,57 @@ class System(Structure):
         stimuli = _stimuli(input)
         return self if stimuli is self.input else replace(self, input=stimuli)
 
-    def with_record(self, *signals: str) -> System:
-        """A copy that records other signals.
+    def with_record(
+        self,
+        *signals: str,
+        trigger: str | Literal[False] | None = None,
+        before: TimeInput | None = None,
+        after: TimeInput | None = None,
+    ) -> System:
+        """A copy that records other signals, or in windows around a trigger.
 
         Args:
             *signals: Names like "plant.gap[1]", or patterns like "plant.*"; one behind a ! is left
                 out: with_record("!plant.clock"). Without any the outputs are recorded.
+            trigger: A condition like "plant.contact[1] == true". A window of the recording begins
+                where it becomes true. False takes the trigger away. None leaves it as it is.
+            before: How much of what came before is in a window, in s. None leaves it as it is, 0 by
+                default.
+            after: How long a window goes on after the last point in it at which the condition
+                became true, in s. None leaves it as it is; a new trigger must have it.
 
         Returns:
             The changed system.
 
         Raises:
-            InputError: A name or pattern matches no signal.
+            InputError: A name or pattern matches no signal, or the trigger is no condition.
         """
         for signal in signals:
             if not isinstance(signal, str):
                 raise InputError(
                     f"record: {signal!r}: must be a name; several are several arguments"
                 )
-        record = Record(signals)
+        record = replace(self.record, signals=signals)
         record.check("record:", self.components, self.outputs)
+        entries = {"trigger": trigger, "before": before, "after": after}
+        overrides = {
+            entry: Override(f"{RECORD}.{entry}", value)
+            for entry, value in entries.items()
+            if value is not None
+        }
+        record = with_trigger(record, overrides)
         return replace(self, record=record)
+
+    def untriggered(self) -> System:
+        """The system that records the whole run; the logger says where it had a trigger.
+
+        Returns:
+            The changed system, or itself where it has no trigger.
+        """
+        if self.record.trigger is None:
+            return self
+        LOGGER.warning("%s: record.trigger: is left out, as all rows are needed", self.name)
+        return replace(self, record=self.record.untriggered())
 
     def as_steered(self) -> System:
         """The system as a session has it, which by default records all that it may set.

@@ -6,30 +6,36 @@ gives what is changed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..base.checks import check_keys, choice, text
+from ..base.checks import as_table, check_keys, choice, number, text
 from ..base.errors import InputError
 from ..interface.read import read_interface
 from .changes import replaced, with_old_values, with_values
-from .overrides import ENTRIES_OF_SECTIONS, ComponentOverrides, Override
+from .overrides import ENTRIES_OF_SECTIONS, METRICS, RECORD, ComponentOverrides, Override
 from .parts import (
     ISOLATIONS,
     Acceptance,
     Component,
     Initialisation,
     Logging,
+    MetricLimit,
     Realtime,
     Solver,
 )
+from .record import Record, Trigger
+from .scenario import read_condition
 from .stimuli import INTERPOLATIONS, Stimuli, read_stimuli
 from .structure import DIVERGING, SCHEMES, Structure
-from .times import LONGEST, in_nanoseconds
+from .times import LONGEST, Time, in_nanoseconds
 
 Options = TypeVar("Options")
+
+ENDS = ("low", "high")
+"""The bounds of a metric in [verdict.metrics]."""
 
 MUST_OF_NAMES = {
     "rename": "a variable of the FMU, a string",
@@ -76,14 +82,43 @@ def sections(
     pace = system.realtime if system else Realtime()
     verdict = system.verdict if system else Acceptance()
     stimuli = system.input if system else None
+    record = system.record if system else Record()
     return {
         **experiment(tables["experiment"].values()),
         "initialisation": _with_options("initialisation", loops, tables["initialisation"]),
         "realtime": _with_options("realtime", pace, tables["realtime"]),
-        "verdict": _with_options("verdict", verdict, tables["verdict"]),
+        "verdict": _with_verdict(verdict, tables["verdict"]),
         "roles": roles,
         "input": _with_input(stimuli, tables["input"], folder),
+        "record": with_trigger(record, tables[RECORD]),
     }
+
+
+def with_trigger(record: Record, overrides: Mapping[str, Override]) -> Record:
+    """The record with another trigger, or other times of it: overrides of "trigger", "before" and
+    "after". The trigger false takes it away.
+    """
+    trigger, times = record.trigger, dict(overrides)
+    when = trigger.when if trigger else None
+    if override := times.pop("trigger", None):
+        is_gone = override.value is False
+        when = None if is_gone else read_condition(override.label, override.value)
+    if when is None:
+        for override in times.values():
+            raise InputError(
+                f"{override.label} = {override.value!r}: there is no trigger; must have one, like "
+                'record.trigger = "plant.contact[1] == true"'
+            )
+        return record.untriggered()
+    spans: dict[str, Time] = {"before": 0}
+    if trigger:
+        spans = {"before": trigger.before_ns, "after": trigger.after_ns}
+    for entry, override in times.items():
+        spans[entry] = in_nanoseconds(override.label, override.value, zero=True)
+    if "after" not in spans:
+        label = next(iter(overrides.values())).label_of("record.after")
+        raise InputError(f"{label}: no entry; a trigger must have one, a time in s, at least 0")
+    return replace(record, trigger=Trigger(when, spans["before"], spans["after"]))
 
 
 def _with_input(
@@ -101,6 +136,55 @@ def _with_input(
     if not isinstance(file, str | Path):
         raise InputError(f"{label_of('input.file')} = {file!r}: must be the path of a CSV file")
     return read_stimuli(folder / file, interpolation, label)
+
+
+def _with_verdict(verdict: Acceptance, overrides: Mapping[str, Override]) -> Acceptance:
+    """The verdict with overrides of its entries, and of the limits of metrics by name."""
+    entry_of = {f"{METRICS}{limit.name}": limit for limit in verdict.metrics}
+    single: dict[str, Override] = {}
+    for entry, override in overrides.items():
+        of_metrics = [override] if entry.startswith(METRICS) else []
+        if entry == METRICS.rstrip("."):
+            of_metrics = [*_of_table(override)]
+        elif not of_metrics:
+            single[entry] = override
+        for limit in of_metrics:
+            place = limit.place.removeprefix("verdict.")
+            end = next((end for end in ENDS if place.endswith(f".{end}")), "")
+            name = place.removesuffix(f".{end}") if end else place
+            older = entry_of.get(name, MetricLimit(name.removeprefix(METRICS)))
+            entry_of[name] = _metric_limit(older, end, limit)
+    options = _with_options("verdict", verdict, single)
+    return replace(options, metrics=tuple(entry_of.values()))
+
+
+def _of_table(override: Override) -> Iterator[Override]:
+    """The overrides that a table of limits of metrics stands for, a place for each number."""
+    for name, entry in as_table(override.label, override.value).items():
+        place = f"{override.place}.{name}"
+        if not isinstance(entry, Mapping):
+            yield Override(place, entry, override.origin)
+            continue
+        check_keys(override.label_of(place), entry, ENDS)
+        for end, value in entry.items():
+            yield Override(f"{place}.{end}", value, override.origin)
+
+
+def _metric_limit(limit: MetricLimit, end: str, override: Override) -> MetricLimit:
+    """The limit of a metric with another end; without one both are new."""
+    label, value = override.label, override.value
+    if not end and isinstance(value, bool):
+        return MetricLimit(limit.name, float(value), float(value))
+    must = "a finite number" if end else "the highest value, a finite number, or true or false"
+    bound = number(label, value, must=must)
+    if not end:
+        return MetricLimit(limit.name, None, bound)
+    changed = replace(limit, low=bound) if end == "low" else replace(limit, high=bound)
+    if changed.low is not None and changed.high is not None and changed.low > changed.high:
+        raise InputError(
+            f"{label} = {bound:g}: low = {changed.low:g} must be at most high = {changed.high:g}"
+        )
+    return changed
 
 
 def _with_options(place: str, options: Options, overrides: Mapping[str, Override]) -> Options:

@@ -24,8 +24,8 @@ SECTIONS = (
 )  # fmt: skip
 """The entries of a system file, which are no names of components."""
 
-RECORD = "record"
-"""Another entry: a list only, which no --set changes, so a component may have its name."""
+RECORD, SIGNALS = "record", "signals"
+"""Another entry, and the list in it, which no --set changes. A component may have its name."""
 
 ENTRIES_OF_SECTIONS: Mapping[str, Sequence[str]] = {
     "experiment": ("step", "stop", "scheme", "diverging", "start", "variant"),
@@ -35,6 +35,7 @@ ENTRIES_OF_SECTIONS: Mapping[str, Sequence[str]] = {
     "realtime": Realtime.__slots__,
     "verdict": Acceptance.__slots__,
     "input": ("file", "interpolation"),
+    RECORD: ("trigger", "before", "after"),
 }
 """The sections that have single values, each with its entries, where these are always the same."""
 
@@ -45,6 +46,9 @@ ENTRIES_OF_COMPONENT = (
     *TABLES_OF_COMPONENT,
 )
 """The entries of a component, of which some are tables."""
+
+METRICS = "metrics."
+"""What the entries of [verdict.metrics] begin with, behind [verdict]."""
 
 PLACE = "{place}"
 """What stands for the place in the origin of an override."""
@@ -184,12 +188,13 @@ def parse_place(components: Collection[str], text: str, label: str) -> Place:
     section, _, path = text.partition(".")
     if section in components:
         section, path = "components", f"{section}.values.{path}"
-    if section == RECORD:
+    if section == RECORD and path == SIGNALS:
         raise InputError(f"{label}: is a list; must be given by --record, or with_record()")
     known(f"{label}: no component", section, [*components, *ENTRIES_OF_SECTIONS])
     if section != "components":
         entries = ENTRIES_OF_SECTIONS[section] or [path]
-        known(f"{label}: no entry", path, entries, f" of [{section}]")
+        if section != "verdict" or not path.startswith(METRICS):
+            known(f"{label}: no entry", path, entries, f" of [{section}]")
         return Place(section, "", path)
     component, _, path = path.partition(".")
     entry, _, name = path.partition(".")

@@ -351,13 +351,26 @@ class Limit:
 
 
 @dataclass(frozen=True, slots=True)
+class MetricLimit:
+    """The lowest and the highest value of a metric, in its SI unit; None for no bound.
+
+    Of a metric with several values the name without an index means each of them.
+    """
+
+    name: str
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Acceptance:
     """What a run with a bench, in real time or with limits may come to, and still pass.
 
     lost: how often a peer was lost; missed, overruns, implausible: shares of the steps; trips of
     peers; limited: commands that were clamped; lead: of a peer's clock in s; refused: what the
     operating system did not grant; initialised_anew: how often the loop was; warnings: limits that
-    were exceeded; unfinished: 1 where the run did not come to its end.
+    were exceeded; unfinished: 1 where the run did not come to its end. A run with limits of its
+    metrics must keep these, whatever it is.
     """
 
     lost: int = 0
@@ -371,6 +384,7 @@ class Acceptance:
     refused: int = 0
     warnings: int = 0
     unfinished: int = 0
+    metrics: tuple[MetricLimit, ...] = ()
 
     def __post_init__(self) -> None:
         counts = "lost", "trips", "limited", "initialised_anew", "refused", "warnings", "unfinished"

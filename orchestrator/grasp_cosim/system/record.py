@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..base.errors import InputError, choices, nearest
 from ..interface.fmi_types import SUPPORTED_KINDS
 from ..interface.interface import Interface
 from ..interface.variables import Variable
-from .parts import Component, Port
+from .parts import Component, Condition, Port
+from .times import Time
 
 LEFT_OUT = "!"
 """Begins a pattern that leaves out what it matches."""
@@ -58,11 +59,25 @@ def pattern(text: str) -> Pattern:
     return Pattern(plain, re.compile(regex, re.DOTALL), plain != text)
 
 
+@dataclass(frozen=True, slots=True)
+class Trigger:
+    """When a run is recorded: in windows around the points at which a condition becomes true.
+
+    A window has what came in before_ns before such a point, and goes on until after_ns after the
+    last one in it.
+    """
+
+    when: Condition
+    before_ns: Time
+    after_ns: Time
+
+
 @dataclass(frozen=True)
 class Record:
-    """The patterns of a system, as they stand in its file."""
+    """What a system records: patterns as they stand in its file, and when: always by default."""
 
     signals: tuple[str, ...] = ()
+    trigger: Trigger | None = None
 
     @property
     def takes_in(self) -> bool:
@@ -104,9 +119,8 @@ class Record:
                     watched[Port(component.name, v.name)] = v
         return watched
 
-    @classmethod
-    def from_texts(cls, texts: Iterable[str]) -> Record:
-        """The record of texts as on a command line, each a list with commas.
+    def with_texts(self, texts: Iterable[str]) -> Record:
+        """The record with the signals of texts as on a command line, each a list with commas.
 
         A comma in brackets is part of a name: a.A[1,2].
         """
@@ -124,7 +138,7 @@ class Record:
                 else:
                     entry += letter
             entries.append(entry.strip())
-        return cls(tuple(entries))
+        return replace(self, signals=tuple(entries))
 
     def has(self, name: str) -> bool:
         """True if a signal is recorded that is worked out of others."""
@@ -135,7 +149,11 @@ class Record:
     def with_outputs(self, components: Sequence[Component]) -> Record:
         """The record that has all outputs in addition, but for those that are left out."""
         outputs = [str(port) for port in self.watched(components)] if self.takes_in else []
-        return Record((*self.signals, *outputs))
+        return replace(self, signals=(*self.signals, *outputs))
+
+    def untriggered(self) -> Record:
+        """The record of the whole run."""
+        return replace(self, trigger=None)
 
     def check(
         self, place: str, components: Sequence[Component], outputs: Collection[str] = ()
@@ -157,7 +175,8 @@ class Record:
             for text in self.signals
             if missing(text, new, outputs) and not missing(text, old, outputs)
         ]
-        return Record(tuple(text for text in self.signals if text not in unmatched)), unmatched
+        matched = tuple(text for text in self.signals if text not in unmatched)
+        return replace(self, signals=matched), unmatched
 
     def _patterns(self) -> tuple[list[Pattern], list[Pattern]]:
         """Those that take signals in, and those that leave them out."""

@@ -1,5 +1,7 @@
-"""Events, faults and limits as entries of the system file, and back; and their checks: they act on
-what exists, in a way that it permits. The format: docs/reference/system_file.md.
+"""Events, faults, limits and the trigger of a recording as entries of the system file, and back;
+and their checks: they act on what exists, in a way that it permits.
+
+The format: docs/reference/system_file.md.
 """
 
 from __future__ import annotations
@@ -41,6 +43,7 @@ from .parts import (
     as_port,
     as_signal,
 )
+from .record import Trigger
 from .structure import Structure
 from .times import Time, first_step, in_nanoseconds, in_seconds, seconds, written
 from .validity import MAX_NAMED, driven
@@ -95,6 +98,15 @@ def read_limits(name: str, entries: Any) -> tuple[Limit, ...]:
         then = choice(f"{place}: then", entry.get("then", THENS[0]), THENS)
         limits.append(Limit(condition, then))
     return tuple(limits)
+
+
+def trigger_entry(trigger: Trigger) -> dict[str, Any]:
+    """The trigger of a recording as run.json has it; times in s."""
+    return {
+        "when": str(trigger.when),
+        "before": in_seconds(trigger.before_ns),
+        "after": in_seconds(trigger.after_ns),
+    }
 
 
 def limit_entry(limit: Limit) -> dict[str, Any]:
@@ -159,18 +171,21 @@ def _target_port(place: str, text: Any, connections: Sequence[Connection]) -> Po
 
 def _condition(place: str, entry: Mapping[str, Any]) -> Condition | None:
     text = entry.get("when")
-    if text is None:
-        return None
+    return None if text is None else read_condition(f"{place}: when", text)
+
+
+def read_condition(place: str, text: Any) -> Condition:
+    """The condition that a text is; InputError where it is none."""
     parts = _CONDITION.fullmatch(text.strip()) if isinstance(text, str) else None
     try:
         port, relation, constant = parts.groups() if parts else ("", "", "none")
         value = _constant_from(constant)
     except ValueError:
         raise InputError(
-            f"{place}: when = {text!r}: must be like 'plant.gap[1] < 0.01', "
+            f"{place} = {text!r}: must be like 'plant.gap[1] < 0.01', "
             "'plant.contact[1] == true' or, for an Enumeration, \"plant.mode == 'fast'\""
         ) from None
-    return Condition(as_signal(f"{place}: when", port), relation, value)  # type: ignore[arg-type]
+    return Condition(as_signal(place, port), relation, value)  # type: ignore[arg-type]
 
 
 def _constant_from(text: str) -> float | bool | str:
@@ -187,13 +202,15 @@ def check_scenario(system: Structure) -> None:
             raise InputError(f"{place}: must have either at, a time in s, or when, a condition")
         if not event.set:
             raise InputError(f"{place}: set is empty; valid: {choices(_settable(system))}")
-        _check_condition(system, event.when, place)
+        _check_condition(system, event.when, f"{place}: when")
         for port, value in event.set.items():
             parse_set_values(system, port, value, f"{place}: set.{port}")
     for i, limit in enumerate(system.limits):
-        _check_condition(system, limit.when, f"{system.name}: limits[{i}]")
+        _check_condition(system, limit.when, f"{system.name}: limits[{i}]: when")
     for i, fault in enumerate(system.faults):
         _check_fault(system, fault, f"{system.name}: faults[{i}]")
+    if trigger := system.record.trigger:
+        _check_condition(system, trigger.when, f"{system.name}: record.trigger")
 
 
 def _settable(system: Structure) -> dict[Port, Variable]:
@@ -263,8 +280,8 @@ def _check_condition(system: Structure, condition: Condition | None, place: str)
         return
     port, value = condition.port, condition.value
     source, _ = read_at(system, port)
-    source = as_port(f"{place}: when", str(source))
-    place = f"{place}: when = '{condition}'"
+    source = as_port(place, str(source))
+    place = f"{place} = '{condition}'"
     interface = system.component(source.component, place).interface
     valid = [v.name for v in interface.variables if v.is_number]
     lacking = f"{place}: {source.component} has no number"
@@ -329,5 +346,5 @@ def _check_fault(system: Structure, fault: Fault, place: str) -> None:
             f"{place}: from {seconds(start)} until {seconds(end)}: must hold a communication "
             f"point, a multiple of {written(step)} s"
         )
-    _check_condition(system, fault.when, place)
+    _check_condition(system, fault.when, f"{place}: when")
     whole(f"{place}: seed", fault.seed, 0, must="a whole number, at least 0")

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from .parts import Acceptance, Component, Realtime
-from .scenario import event_entry, fault_entry, limit_entry
+from .scenario import event_entry, fault_entry, limit_entry, trigger_entry
 from .stimuli import input_entry
 from .structure import Structure
 from .times import in_seconds
@@ -35,6 +35,8 @@ def settings(system: Structure) -> dict[str, Any]:
     entries["metrics"] = list(system.metrics)
     if system.record.signals:
         entries["record"] = list(system.record.signals)
+    if system.record.trigger:
+        entries["trigger"] = trigger_entry(system.record.trigger)
     entries["roles"] = dict(system.roles)
     entries["connections"] = [
         {"from": str(c.source), "to": str(c.target), "factor": c.factor, "offset": c.offset}
@@ -45,12 +47,19 @@ def settings(system: Structure) -> dict[str, Any]:
     if system.limits:
         entries["limits"] = [limit_entry(limit) for limit in system.limits]
     if system.verdict != Acceptance():
-        entries["acceptance"] = asdict(system.verdict)
+        entries["acceptance"] = _acceptance(system.verdict)
     if system.realtime != Realtime():
         entries["realtime"] = asdict(system.realtime)
     if system.input:
         entries["input"] = input_entry(system.input)
     return entries
+
+
+def _acceptance(verdict: Acceptance) -> dict[str, Any]:
+    """The limits of the verdict, those of metrics by name."""
+    entries = asdict(verdict)
+    metrics = {limit.pop("name"): limit for limit in entries.pop("metrics")}
+    return {**entries, "metrics": metrics} if metrics else entries
 
 
 def _component(component: Component) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,12 @@ from .overrides import (
     PLACE,
     RECORD,
     SECTIONS,
+    SIGNALS,
     TABLES_OF_COMPONENT,
     ComponentOverrides,
     Override,
 )
 from .parts import Component, Connection, as_port
-from .record import Record
 from .scenario import read_events, read_faults, read_limits
 from .stimuli import Stimuli
 from .validity import by_element
@@ -93,12 +94,13 @@ def _overrides(file: str, place: str, table: Mapping[str, Any]) -> dict[str, Ove
 def check_sections(file: dict[str, Any], name: str) -> None:
     """Check which tables there are in a file of that name, and fill in those that are left out."""
     check_keys(name, file, (*SECTIONS, RECORD))
-    for section in (*ENTRIES_OF_SECTIONS, "presets", RECORD):
+    for section in (*ENTRIES_OF_SECTIONS, "presets"):
         label = f"{name}: [{section}]"
         must_be_there = section in ("experiment", "components")
         file[section] = as_table(label, file.get(section, None if must_be_there else {}))
         if entries := ENTRIES_OF_SECTIONS.get(section):
-            check_keys(label, file[section], entries)
+            keys = (SIGNALS, *entries) if section == RECORD else entries
+            check_keys(label, file[section], keys)
 
 
 def described(
@@ -122,6 +124,8 @@ def described(
     if stimuli:
         file["input"] = {}
     file["experiment"] = DEFAULT_EXPERIMENT | file["experiment"]
+    file[RECORD] = {**file[RECORD]}
+    recorded = _recorded_signals(name, file[RECORD].pop(SIGNALS, []))
     single_values = {
         section: _overrides(name, section, file[section])
         for section in ENTRIES_OF_SECTIONS
@@ -140,18 +144,17 @@ def described(
         "limits": read_limits(name, file.get("limits", [])),
         "presets": file["presets"],
         "metrics": tuple(metrics),
-        "record": _record(name, file[RECORD]),
+        "record": replace(attributes["record"], signals=recorded),
     }
 
 
-def _record(name: str, table: Mapping[str, Any]) -> Record:
-    """What [record] of a file of that name says."""
-    check_keys(f"{name}: [{RECORD}]", table, ("signals",))
-    label = f"{name}: {RECORD}.signals"
-    signals = _list(label, table.get("signals", []), '["plant.*"]')
-    for i, entry in enumerate(signals):
-        text(f"{label}[{i}]", entry, "a name like 'plant.gap[1]', or 'plant.*'")
-    return Record(tuple(signals))
+def _recorded_signals(name: str, entry: Any) -> tuple[str, ...]:
+    """The signals that [record] of a file of that name has."""
+    label = f"{name}: {RECORD}.{SIGNALS}"
+    signals = _list(label, entry, '["plant.*"]')
+    for i, signal in enumerate(signals):
+        text(f"{label}[{i}]", signal, "a name like 'plant.gap[1]', or 'plant.*'")
+    return tuple(signals)
 
 
 def _list(label: str, entry: Any, form: str) -> list[Any]:

@@ -354,6 +354,11 @@ def _remarks_on_components(system: Structure) -> Iterator[str]:
                 free += [name] if is_whole else without
         if free:
             yield f"{c.name}: no source for {choices(free, MAX_NAMED)}: kept as the FMU starts with"
+    if system.record.trigger:
+        yield (
+            "record.trigger: the metrics of the run are of every step, those of a window are of "
+            "its rows"
+        )
     if not system.recorded:
         yield (
             f"{system.name}: nothing is recorded; must have an output or a local that is a Real, "
