@@ -82,6 +82,11 @@ def test_c_alone(command):
     for path in Path("one").iterdir():
         assert path.read_bytes() == (Path("all/GraspController") / path.name).read_bytes()
     assert not Path("fmus").exists()
+    code, out, _ = command(
+        "build", "--native", "--c-only", "tool", "GraspController", "--a2l", "--json"
+    )
+    assert {*json.loads(out)["files"]} == {str(path) for path in Path("tool").iterdir()}
+    assert Path("tool/GraspController.a2l").is_file()
 
 
 @needs_zig

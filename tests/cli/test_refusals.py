@@ -43,6 +43,7 @@ build --native --target linux65 :: build: --target 'linux65': must be of linux64
 build --native --fmi 1 :: Invalid value for '--fmi': '1' is not one of '2', '3'.
 build --target linux64 :: --target linux64: needs --native
 build --native --c-only c --fmi 3 :: build: --c-only cannot be used with --target
+build --native --a2l :: --a2l: needs --native --c-only DIR
 build file.toml :: file.toml: is a .toml file; must be a block, a Python file; `grasp-cosim
 build plant.fmu :: plant.fmu: is an FMU; must be a block, a Python file; `grasp-cosim inspect
 build GripperPlant :: GripperPlant is a built-in block: --native builds it on its own

@@ -79,8 +79,8 @@ def test_what_needs_all_rows_does_without_a_trigger_and_says_so(command):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["record.trigger=plant.contact[1] > 0", "record.after=1"], "grasp.toml: record.trigger = "
-         "'plant.contact[1] > 0.0': plant.contact[1] is Boolean; must be compared with true or "),
+        (["record.trigger=plant.contact[1] > 2", "record.after=1"], "grasp.toml: record.trigger = "
+         "'plant.contact[1] > 2.0': plant.contact[1] is Boolean; must be compared with true or "),
         (["record.before=1"], "--set record.before = 1: there is no trigger; must have one, like "),
         (["record.signals=a"], "--set record.signals: is a list; must be given by --record, or "),
         (["record.tigger=a"], "--set record.tigger: no entry 'tigger' of [record]; did you mean "),

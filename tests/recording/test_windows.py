@@ -183,6 +183,17 @@ def contact(grasp, **times):
     return system.with_record(trigger="plant.contact[1] == true", **times)
 
 
+@pytest.mark.parametrize("condition", ["> 0", "== 1", ">= 1", "!= 0", "!= false"])
+def test_a_boolean_is_compared_with_its_number_too(grasp, condition):
+    by_word, by_number = (
+        simulate(contact(grasp, before=0.05, after=0.1).with_record(trigger=f"plant.contact[1] {c}",
+                                                                    before=0.05, after=0.1))
+        for c in ("== true", condition)
+    )  # fmt: skip
+    [expected], [found] = by_word.windows, by_number.windows
+    assert found.time.tolist() == expected.time.tolist()
+
+
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("realtime", [False, Realtime(factor=1e3)])
 def test_each_window_is_the_folder_of_a_run(grasp, tmp_path, form, realtime):

@@ -290,15 +290,17 @@ def _check_condition(system: Structure, condition: Condition | None, place: str)
     items = interface.by_name[source.variable].items
     if source != port:
         kind = system.once(taps)[str(port)].kind
-    relations = {"Real": RELATIONS[:4], "Boolean": RELATIONS[4:]}.get(kind, RELATIONS)
+    boolean = kind == "Boolean"
+    is_word = isinstance(value, bool)
+    relations = {"Real": RELATIONS[:4]}.get(kind, RELATIONS[4:] if is_word else RELATIONS)
     if isinstance(value, str):
         known(f"{place}: {port} is {kind} and has no item", value, items)
     elif kind == "Integer" and float(value).is_integer():
         exact(place, int(value))
-    boolean = kind == "Boolean"
-    fits = isinstance(value, str) or (isinstance(value, bool) == boolean and math.isfinite(value))
+    fits_number = value in (0.0, 1.0) if boolean else not is_word
+    fits = isinstance(value, str) or (fits_number and math.isfinite(value))
     if condition.relation not in relations or not fits:
-        constants = "true or false" if boolean else "a finite number"
+        constants = "true or false, or 0 or 1" if boolean else "a finite number"
         raise InputError(
             f"{place}: {port} is {kind}; must be compared with {constants}, by {choices(relations)}"
         )
