@@ -297,3 +297,45 @@ def test_noise_under_the_sanitizers(name, written):
     assert refused > 1000
     assert changed > 50
     assert measured > 1000
+
+
+def test_pyxcp_reads_all_and_calibrates(written):
+    """A master of others: all parameters, one that is set, one that is refused and stays."""
+    pytest.importorskip("pyxcp")
+    from pyxcp.config import create_application_from_config
+    from pyxcp.master.master import Master
+    from pyxcp.types import XcpResponseError
+
+    folder = written("GraspController")
+    places = variables_of(folder / "GraspController.a2l")
+    starts = {v.name: v.start for v in shipped_model("GraspController").description.variables}
+    with slave(folder, "GraspController") as ours:
+        port = ours.socket.getpeername()[1]
+        transport = {"host": "127.0.0.1", "port": port, "protocol": "UDP"}
+        config = {
+            "Transport": {"layer": "ETH", "Eth": transport},
+            "General": {"disable_error_handling": True},
+        }
+        with Master("eth", create_application_from_config(config)) as master:
+
+            def read(name):
+                address, form = places[name]
+                master.setMta(address)
+                return struct.unpack(form, master.fetch(struct.calcsize(form)))[0]
+
+            master.connect()
+            assert master.identifier(1) == "GraspController"
+            for name in places:
+                if starts[name] is not None:
+                    assert read(name) == starts[name]
+            gain, mass = "simultaneous_contact.gain", "simultaneous_contact.mass"
+            master.setMta(places[gain][0])
+            master.download(struct.pack("<d", 6.5))
+            assert read(gain) == 6.5
+            master.setMta(places[mass][0])
+            with pytest.raises(XcpResponseError, match="ERR_OUT_OF_RANGE"):
+                master.download(struct.pack("<d", -1.0))
+            assert read(mass) == starts[mass]
+            master.disconnect()
+        ours.connect()
+        assert ours.read(GAIN, 8) == struct.pack("<d", 6.5)
