@@ -39,7 +39,8 @@ class Scene:
     """A section for one kind of system, and how its signals are shown: colours, marks, buttons.
 
     `html` is the content of its section under `title`. `scripts` define startScene(state), which
-    returns what draws it and plays it: {draw(), toggle()}. A colour is the name of a CSS variable
+    returns what draws it and plays it: {draw(), toggle(), renew()}. The last takes the state and the
+    signals of a run that goes on, as they are now. A colour is the name of a CSS variable
     that `style` or the page defines.
     """
 
@@ -70,6 +71,7 @@ def traces_page(
     data: str,
     script: Sequence[str],
     style: str = "",
+    footer: str = "Everything on this page is inside this one file.",
 ) -> str:
     """Return a page with traces as text.
 
@@ -81,6 +83,7 @@ def traces_page(
         data: The HTML of columns_html().
         script: The scripts that come between those of the traces and main.js.
         style: What comes after the style that all pages have.
+        footer: A sentence at its end.
     """
     links = "".join(f'<a href="#{name}">{head}</a>' for name, (head, _) in sections.items())
     elements = [
@@ -95,6 +98,7 @@ def traces_page(
         contents=links,
         sections="\n".join(elements),
         version=escape(version("grasp-cosim")),
+        footer=escape(footer),
         page=json.dumps(state).replace("<", "\\u003c"),  # cannot end its script element
         data=data,
         script="\n".join([traces_script(), *script, scripts("main")]),

@@ -1,7 +1,7 @@
 // The page at work: which signals, what time, what zoom; all of it in the address after the #.
 "use strict";
 
-const recording = new Recording(page);
+const recording = new Source(page);
 const MOST = 6; // lines of a panel
 let chosen = [...page.shown], asked = 0;
 
