@@ -178,7 +178,7 @@ class LivePage:
             return
         number, lines, scene, is_last = self.feed.pairs.count, 0, 0, False
         sleeper = threading.Event()
-        while not is_last:
+        while not is_last and goes_on():
             with self.feed.changed:
                 if not self.feed.ended and self.feed.pairs.count == number:
                     self.feed.changed.wait(HEARTBEAT)

@@ -35,8 +35,9 @@ def page_html(
     if scene:
         sections["scene"] = scene.title, scene.html
     note = f" {left_out} signals are not shown: texts, or too many." if left_out else ""
-    sections["traces"] = "Traces", traces_html(
-        EXACTNESS + note, dict(result.units), result.descriptions, ()
+    sections["traces"] = (
+        "Traces",
+        traces_html(EXACTNESS + note, dict(result.units), result.descriptions, ()),
     )
     sections["parameters"] = "Parameters", panel_html(list(settings))
     sections["log"] = "Log", '<ol id="lines" class="plain" aria-live="polite"></ol>'
@@ -52,7 +53,7 @@ def page_html(
     }
     return traces_page(
         heading,
-        summary="A run that goes on.",
+        summary="The page follows the run while it goes on.",
         sections=sections,
         state=state,
         data="",

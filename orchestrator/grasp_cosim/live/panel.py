@@ -31,7 +31,7 @@ def _entry(system: System, port: Port, variable: Variable) -> dict[str, Any]:
         "component": port.component,
         "variable": variable.name,
         "kind": variable.kind,
-        "unit": variable.unit or "",
+        "unit": "" if variable.unit in (None, "1") else variable.unit,
         "text": variable.description or "",
         "value": value,
         "items": dict(variable.items),

@@ -38,8 +38,10 @@ PATIENCE = 5.0
 ANSWER_WITHIN = 30.0
 """s that a request waits for the next communication point."""
 
-GRACE = 3.0
-"""s after the end of a run in which pages may still take its last rows."""
+GRACE, QUIET, LOOK = 3.0, 0.4, 0.02
+"""s after the end of a run in which pages may still take its last rows, at most; s without any
+request after which they have them; s between two looks at that.
+"""
 
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
@@ -87,6 +89,7 @@ class LiveServer(ThreadingHTTPServer):
         self._connections = threading.BoundedSemaphore(MAX_CONNECTIONS)
         self.clients = threading.BoundedSemaphore(MAX_CLIENTS)
         self._open: set[socket.socket] = set()
+        self._had_clients = False
         self._lock = threading.Lock()
         try:
             super().__init__((LOOPBACK, port), _Handler)
@@ -119,20 +122,25 @@ class LiveServer(ThreadingHTTPServer):
         self.server_address = self.socket.getsockname()
         self.server_name, self.server_port = LOOPBACK, self.port
 
+    def note_client(self) -> None:
+        """Take note that a page follows the run."""
+        self._had_clients = True
+
     def start(self) -> None:
         """Begin to serve."""
         self._thread.start()
 
     def close(self) -> None:
         """Give clients the time to take what is left, then end all threads."""
+        quiet = 0.0 if self._had_clients else QUIET
+        waited = 0.0
+        while quiet < QUIET and waited < GRACE:
+            self.closing.wait(LOOK)
+            waited += LOOK
+            quiet = 0.0 if self._open else quiet + LOOK
         self.closing.set()
         self.shutdown()
         self._thread.join()
-        wait = threading.Event()
-        for _ in range(int(GRACE / 0.02)):
-            if not self._open:
-                break
-            wait.wait(0.02)
         with self._lock:
             for connection in self._open:
                 with suppress(OSError):
@@ -215,6 +223,7 @@ class _Handler(BaseHTTPRequestHandler):
         if not clients.acquire(blocking=False):
             self._send(_text(503, f"{MAX_CLIENTS} pages follow this run already"))
             return
+        self.server.note_client()
         try:
             self._head(200, "text/event-stream; charset=utf-8")
             goes_on = self.server.closing

@@ -60,7 +60,11 @@ class LiveRecording extends Recording {
       this.measure();
     }
     news(frame);
-    if (frame.last) this.source.close();
+    if (!frame.last) return;
+    this.source.close();
+    for (const { row } of parameters.values()) {
+      for (const box of row.querySelectorAll("input, select")) box.disabled = true;
+    }
   }
 
   append({ first, rows }) {
@@ -69,7 +73,8 @@ class LiveRecording extends Recording {
     if (known >= pairs || this.loading) return;
     const more = 2 * (pairs - known);
     if (first > this.next || this.rows + more > this.columns[0].length) {
-      this.fill(); // some were skipped, or there is no more room
+      // some were skipped, or there is no more room; after the end there is nobody to ask
+      this.fill().catch(() => { this.loading = false; });
       return;
     }
     for (let i = 0; i < more; i++) {
@@ -99,9 +104,10 @@ class LiveRecording extends Recording {
 }
 
 Source = LiveRecording;
+beside = 1400;
 
 // What the server says -----------------------------------------------------------------------
-let following = true, due2 = 0, figures = {};
+let following = true, pending = 0, figures = {};
 
 function stateIs(state, reason) {
   const element = find("run-state");
@@ -123,7 +129,7 @@ function news(frame) {
   }
   if (frame.scene) page.scene = frame.scene.state;
   if (frame.scene || frame.lines.length) marks(frame.scene?.marks);
-  due2 ||= requestAnimationFrame(renew);
+  pending ||= requestAnimationFrame(renew);
 }
 
 let sceneMarks = [];
@@ -139,7 +145,7 @@ function marks(ofScene) { // the moments of the scene, and those of changes
 
 // What is seen of it -------------------------------------------------------------------------
 function renew() {
-  due2 = 0;
+  pending = 0;
   tell();
   if (!state.ready || !recording.rows) return;
   for (const panel of panels) {
@@ -204,6 +210,9 @@ function startLive() {
   find("scrub")?.addEventListener("input", stop);
   find("play")?.addEventListener("click", stop, { capture: true });
   find("all").addEventListener("click", stop, { capture: true });
+  for (const jump of document.querySelectorAll("button[data-at]")) {
+    jump.addEventListener("click", stop, { capture: true });
+  }
   document.addEventListener("keydown", (event) => {
     if (event.target.closest("input, select, textarea, button, summary")) return;
     if (["ArrowLeft", "ArrowRight", "+", "-", "0", " "].includes(event.key)) stop();

@@ -124,7 +124,7 @@ async function begin() {
   view = whole();
   if (page.scene) scene = await startScene(page.scene);
   connect();
-  find("signals").open = innerWidth > 760;
+  find("signals").open = innerWidth > beside;
   await recall();
   draw();
   state.ready = "yes";
