@@ -141,7 +141,7 @@ class Browser:
 
 
 def _spawned(arguments: list[str], reads: int, writes: int) -> int:
-    """Start a program that reads descriptor 3 and writes descriptor 4; the number of its process."""
+    """The number of the process of a program, which reads descriptor 3 and writes descriptor 4."""
     high = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, FREE) for end in (reads, writes)]
     try:
         return os.posix_spawn(

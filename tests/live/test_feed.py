@@ -87,8 +87,8 @@ def test_who_is_behind_gets_what_is_there_and_knows_what_is_missing(monkeypatch)
     assert pairs.since(5, 100).first > 5
 
 
-def made(signals, rate=1000.0):
-    feed = Feed(rate)
+def made(signals, factor=1.0, every=1):
+    feed = Feed(factor, every)
     feed.begin(Experiment.of(SETTINGS), signals)
     return feed
 
@@ -121,8 +121,8 @@ def test_rows_that_nobody_pairs_are_paired_by_who_brings_too_many(monkeypatch):
 
 
 def test_many_signals_have_fewer_pairs_and_very_many_are_left_out():
-    few = made([Signal("a.x", None, "Real")], 10_000.0)
-    many = made([Signal(f"a.x{i}", None, "Real") for i in range(MAX_SIGNALS + 5)], 10_000.0)
+    few = made([Signal("a.x", None, "Real")], 10.0)
+    many = made([Signal(f"a.x{i}", None, "Real") for i in range(MAX_SIGNALS + 5)], 10.0)
     assert (few.pairs._block_rows, many.left_out, len(many.signals)) == (50, 5, MAX_SIGNALS)
     assert many.pairs._block_rows > few.pairs._block_rows
-    assert made([Signal("a.x", None, "Real")], 3.0).pairs._block_rows == 2
+    assert made([Signal("a.x", None, "Real")], 1.0, 300).pairs._block_rows == 2

@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from ..base.errors import InputError, RunInterruptedError, SimulationError
+from ..exchange.listener import Listener
 from ..live.live_page import LivePage
 from ..master.simulation import simulate
 from ..recording.folder import FORMS, Form, RunFolder
@@ -142,6 +143,10 @@ def run(
             elif out:
                 say(f"kept what was recorded, in {out}")
 
+        listeners: list[Listener] = [folder] if folder else []
+        if page:
+            listeners.append(page.feed)
+
         def note(line: str) -> None:
             say(line)
             if page:
@@ -155,7 +160,7 @@ def run(
                     chosen,
                     progress=not is_quiet(),
                     every=every,
-                    listeners=[*filter(None, (folder, page and page.feed))],
+                    listeners=listeners,
                     realtime=realtime,
                     metrics=metrics,
                     note=note,

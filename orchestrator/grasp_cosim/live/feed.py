@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from ..exchange.listener import Experiment, Floats, Signal, Steps
 from ..report.embed import lowest_and_highest
+from ..system.times import in_seconds
 
 PAIRS_PER_SECOND = 200
 """Of wall time; of many signals there are fewer."""
@@ -143,9 +144,9 @@ class Feed:
     `changed` is notified, with its lock held, where there is something new. Strings are left out.
     """
 
-    def __init__(self, rows_per_second: float) -> None:
-        """Take so many rows in a second of wall time."""
-        self._rows_per_second = rows_per_second
+    def __init__(self, factor: float, every: int = 1) -> None:
+        """Take every n-th row of a run that is so many times as fast as real time."""
+        self._factor, self._every = factor, every
         self.changed = threading.Condition()
         self.begun = threading.Event()
         """Set once there is the first row, that of the start."""
@@ -164,7 +165,8 @@ class Feed:
         """How many signals are not shown."""
         self._places = np.array(places, np.intp)
         pairs = min(PAIRS_PER_SECOND, MAX_VALUES_PER_SECOND / (2 * (1 + len(places))))
-        self.pairs = Pairs(len(places), max(2, round(self._rows_per_second / pairs)))
+        rows = self._factor / (in_seconds(experiment.step_ns) * self._every)
+        self.pairs = Pairs(len(places), max(2, round(rows / pairs)))
 
     def block(self, steps: Steps, rows: Floats) -> None:
         """Copy the rows; nothing else is done with them here, unless very many wait."""

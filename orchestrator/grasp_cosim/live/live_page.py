@@ -15,7 +15,6 @@ from ..interface.values import Given
 from ..master.requests import Answer, Requests
 from ..report.traces_page import Scene
 from ..system.description import System
-from ..system.times import in_seconds
 from .feed import Feed
 from .page import page_html
 from .panel import settings_of
@@ -68,8 +67,7 @@ class LivePage:
         """The system to run, which records all that may be set."""
         self.requests = Requests(self.system)
         """What the page asks for; for simulate()."""
-        self._factor = self.system.realtime.factor
-        self.feed = Feed(self._factor / (in_seconds(system.step_ns) * every))
+        self.feed = Feed(system.realtime.factor, every)
         """The listener to give to simulate()."""
         self.settings = settings_of(self.system)
         self._of = {entry["name"]: entry for entry in self.settings}

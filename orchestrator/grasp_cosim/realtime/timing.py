@@ -188,7 +188,7 @@ class _Judged(NamedTuple):
 
 
 class SoFar(NamedTuple):
-    """Steps that ended after their deadline; the longest step, and the latest begin of one, in s."""
+    """Steps that ended after their deadline; the longest, and the latest begin of one, in s."""
 
     overruns: int
     longest: float

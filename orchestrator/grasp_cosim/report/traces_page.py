@@ -39,9 +39,9 @@ class Scene:
     """A section for one kind of system, and how its signals are shown: colours, marks, buttons.
 
     `html` is the content of its section under `title`. `scripts` define startScene(state), which
-    returns what draws it and plays it: {draw(), toggle(), renew()}. The last takes the state and the
-    signals of a run that goes on, as they are now. A colour is the name of a CSS variable
-    that `style` or the page defines.
+    returns what draws it and plays it: {draw(), toggle(), renew(state, series)}. The last takes the
+    state and the signals of a run that goes on, as they are now. A colour is the name of a CSS
+    variable that `style` or the page defines.
     """
 
     title: str
