@@ -2,18 +2,18 @@
 
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..base.errors import InputError, RunInterruptedError, SimulationError
 from ..exchange.listener import Listener
-from ..live.live_page import LivePage
 from ..master.simulation import simulate
 from ..recording.folder import FORMS, Form, RunFolder
 from ..recording.mdf import check_mdf
 from ..recording.result import Result
 from ..report import terminal
+from ..system.description import System
 from ..system.structure import SCHEMES
 from .frame import (
     INTERRUPTED,
@@ -39,6 +39,9 @@ from .options import (
     system_options,
     values_option,
 )
+
+if TYPE_CHECKING:
+    from ..live.live_page import LivePage
 
 
 @click.command()
@@ -130,7 +133,7 @@ def run(
         check_mdf()
     check_outputs(out, plot)
     chosen = natively(system, native)
-    page = LivePage(chosen, every) if shows_page else None
+    page = _page_of(chosen, every) if shows_page else None
     if page:
         chosen = page.system
     command = ("grasp-cosim", *click.get_current_context().find_root().obj)
@@ -176,6 +179,13 @@ def run(
         if not criterion.passed:
             say(f"verdict: {criterion}")
     return 0 if result.signals and result.passed else NEGATIVE  # a line above gives the reason
+
+
+def _page_of(system: System, every: int) -> "LivePage":
+    """The page that is to follow the run of a system."""
+    from ..live.live_page import LivePage  # only here: most runs have none
+
+    return LivePage(system, every)
 
 
 def _write(

@@ -149,8 +149,8 @@ class Feed:
         self._factor, self._every = factor, every
         self.changed = threading.Condition()
         self.begun = threading.Event()
-        """Set once there is the first row, that of the start."""
-        self.ended = False
+        """Set once there is the first row, that of the start, or none will come."""
+        self.has_rows = self.ended = False
         self._lock = threading.Lock()
         """Of what waits; who has it does nothing else."""
         self._waiting: list[tuple[Steps, Floats]] = []
@@ -193,6 +193,7 @@ class Feed:
             self.ended = self.ended or last
             if rows:
                 self.time = float(rows[-1][-1, 0])
+                self.has_rows = True
                 self.begun.set()
             self.changed.notify_all()
 

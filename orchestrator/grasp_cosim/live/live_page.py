@@ -119,7 +119,7 @@ class LivePage:
                 self._line_count += 1
 
     def _end(self, state: str, reason: str) -> None:
-        if self.feed.begun.is_set():
+        if self.feed.has_rows:
             self._look(links=True, scene=True)
         with self.feed.changed:
             self._state, self._reason = state, reason
@@ -133,7 +133,7 @@ class LivePage:
         while not self._over.wait(FRAME):
             self.feed.digest()
             beats += 1
-            if not self.feed.begun.is_set():
+            if not self.feed.has_rows:
                 continue
             often, seldom = (beats % round(period / FRAME) == 0 for period in (OFTEN, SELDOM))
             if self._has_scene is None or often or seldom:
@@ -156,8 +156,8 @@ class LivePage:
     # What the server asks for.
 
     def page(self) -> str:
-        """The page; InputError where the run does not begin."""
-        if not self.feed.begun.wait(START_WITHIN) or not hasattr(self.feed, "pairs"):
+        """The page; one that says so where the run has not begun."""
+        if not (self.feed.begun.wait(START_WITHIN) and self.feed.has_rows):
             return "<!DOCTYPE html><title>live</title><p>The run has not begun.</p>"
         if self._has_scene is None:
             self._look(links=True, scene=True)
@@ -172,7 +172,7 @@ class LivePage:
 
     def frames(self, goes_on: Callable[[], bool]) -> Iterator[str]:
         """What a client gets: see Source. At most 30 frames a second, and the newest."""
-        if not self.feed.begun.wait(START_WITHIN) or not hasattr(self.feed, "pairs"):
+        if not (self.feed.begun.wait(START_WITHIN) and self.feed.has_rows):
             return
         number, lines, scene, is_last = self.feed.pairs.count, 0, 0, False
         sleeper = threading.Event()
@@ -188,6 +188,7 @@ class LivePage:
                 frame |= {
                     "first": piece.first,
                     "rows": base64.b64encode(piece.rows.astype("<f8").tobytes()).decode(),
+                    "line": max(lines, self._line_count - len(self._lines)),
                     "lines": self._lines[max(0, lines - self._line_count + len(self._lines)) :],
                     "last": is_last,
                 }

@@ -156,7 +156,12 @@ class Scenario:
             period = self._system.period(request.port.component)
             due = -(-step // period) * period
             event = Event({request.port: request.value})
-            happen = partial(self._do, requests, request, self._setter("set", event))
+            try:
+                act = self._setter("set", event)
+            except InputError as error:  # a number that its slot does not hold
+                requests.settle(request, error)
+                continue
+            happen = partial(self._do, requests, request, act)
             occurrence = Occurrence(due, math.inf, period, None, happen)
             self._requested.append(occurrence)
             self._pending.append(occurrence)

@@ -293,7 +293,7 @@ def fmus_of(components: Sequence[Component], folder: Path) -> dict[str, dict[str
 
 def _path_from(folder: Path, path: Path) -> str:
     """The way from a folder to a file, without links, which it would not lead through."""
-    return os.path.relpath(path.resolve(), folder.resolve())
+    return os.path.relpath(os.path.realpath(path), os.path.realpath(folder))
 
 
 def file_hash(path: Path) -> str | None:

@@ -98,7 +98,8 @@ class LiveRecording extends Recording {
 
   gone() { // the server ends with the run; without a last word of it, it was ended
     if (["running", "starting"].includes(find("run-state").dataset.state)) {
-      stateIs("lost", "No answer any more: the run was ended, or its computer is busy.");
+      stateIs("lost", "No answer any more: the run was ended, its computer is busy, or too many "
+        + "pages follow it.");
     }
   }
 }
@@ -107,7 +108,7 @@ Source = LiveRecording;
 beside = 1400;
 
 // What the server says -----------------------------------------------------------------------
-let following = true, pending = 0, figures = {};
+let following = true, pending = 0, figures = {}, knownLines = 0;
 
 function stateIs(state, reason) {
   const element = find("run-state");
@@ -122,11 +123,13 @@ function news(frame) {
   stateIs(frame.state, frame.reason);
   figures = frame;
   for (const [name, value] of Object.entries(frame.values)) parameters.get(name)?.take(value);
-  for (const line of frame.lines) {
+  frame.lines.forEach((line, i) => {
+    if (frame.line + i < knownLines) return; // they come again on a new connection
     const item = document.createElement("li");
     item.textContent = line;
     find("lines").append(item);
-  }
+  });
+  knownLines = Math.max(knownLines, frame.line + frame.lines.length);
   if (frame.scene) page.scene = frame.scene.state;
   if (frame.scene || frame.lines.length) marks(frame.scene?.marks);
   pending ||= requestAnimationFrame(renew);
