@@ -6,7 +6,6 @@ Unlike --screenshot and --dump-dom this works for a page that goes on loading, a
 from __future__ import annotations
 
 import base64
-import fcntl
 import itertools
 import json
 import os
@@ -14,6 +13,7 @@ import shutil
 import signal
 import time
 from contextlib import ExitStack
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Self
@@ -142,15 +142,17 @@ class Browser:
 
 def _spawned(arguments: list[str], reads: int, writes: int) -> int:
     """The number of the process of a program, which reads descriptor 3 and writes descriptor 4."""
+    fcntl: Any = import_module("fcntl")  # of POSIX, as the function below
+    posix: Any = os
     high = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, FREE) for end in (reads, writes)]
     try:
-        return os.posix_spawn(
+        return int(posix.posix_spawn(
             arguments[0], arguments, os.environ,
             file_actions=[
-                *((os.POSIX_SPAWN_OPEN, number, os.devnull, os.O_RDWR, 0) for number in (1, 2)),
-                *((os.POSIX_SPAWN_DUP2, end, number) for number, end in enumerate(high, 3)),
+                *((posix.POSIX_SPAWN_OPEN, number, os.devnull, os.O_RDWR, 0) for number in (1, 2)),
+                *((posix.POSIX_SPAWN_DUP2, end, number) for number, end in enumerate(high, 3)),
             ],
-        )  # fmt: skip
+        ))  # fmt: skip
     finally:
         for end in high:
             os.close(end)

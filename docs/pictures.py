@@ -124,7 +124,7 @@ def draw_live(folder: Path) -> None:
 
     def look(address: str) -> None:
         try:
-            with Browser(1400, 1240) as browser:
+            with Browser(1400, 1300) as browser:
                 browser.open(address)
                 browser.wait_for("document.documentElement.dataset.ready && recording.last > 5")
                 browser.evaluate(
