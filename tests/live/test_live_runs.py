@@ -74,7 +74,8 @@ def test_a_value_that_does_not_fit_is_refused_and_the_old_one_stays(grasp):
     assert [status for status, _ in refused] == [422] * 4
     reasons = [answer["error"] for _, answer in refused]
     assert reasons[0] == f"set: {NAME}: reflectance = -1.0: must be a finite number from 0 to 10"
-    assert reasons[3] == "set: no.name: is nothing that can be set in this run"
+    assert "must be set before the run, --set plant.object_width=VALUE" in reasons[2]
+    assert reasons[3].startswith("set: no.name: no component 'no'; valid: plant, sensor_1, ")
     assert taken[1]["value"] == 1.0
     assert len(result.settings["events"]) == 1
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from types import TracebackType
 from typing import Any, Self
 
-from ..base.errors import InputError, RunInterruptedError
+from ..base.errors import RunInterruptedError
 from ..interface.values import Given
 from ..master.requests import Answer, Requests
 from ..report.traces_page import Scene
@@ -219,10 +219,9 @@ class LivePage:
 
     def set(self, name: str, value: Given, within: float) -> Answer:
         """Set a variable, and note what it has then."""
-        if name not in self._of:
-            raise InputError(f"set: {name}: is nothing that can be set in this run")
         answer = self.requests.ask(name, value).result(within)
         with self.feed.changed:
-            self._of[name] |= {"value": answer.value, "is_set": True}
+            if name in self._of:  # which has no second names of a variable
+                self._of[name] |= {"value": answer.value, "is_set": True}
         self.note(answer.line)
         return answer

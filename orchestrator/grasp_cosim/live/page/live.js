@@ -108,7 +108,7 @@ Source = LiveRecording;
 beside = 1400;
 
 // What the server says -----------------------------------------------------------------------
-let following = true, pending = 0, figures = {}, knownLines = 0;
+let following = true, pending = 0, figures = {}, knownLines = 0, toldLinks = "";
 
 function stateIs(state, reason) {
   const element = find("run-state");
@@ -172,17 +172,18 @@ function tell() {
   find("run-late").textContent = overruns === undefined ? ""
     : `${overruns} ${overruns === 1 ? "step" : "steps"} late, begin at worst ${
       text(1e3 * latest, 3)} ms late`;
-  const links = Object.entries(figures.links);
+  const links = Object.entries(figures.links), told = JSON.stringify(links);
+  if (told === toldLinks) return;
+  toldLinks = told;
   find("links").hidden = !links.length;
   find("links").querySelector("tbody").replaceChildren(...links.map(linkRow));
 }
 
 function linkRow([name, link]) {
   const row = document.createElement("tr"), ms = (s) => `${text(1e3 * s, 3)} ms`;
-  const counts = ["missed", "late", "out_of_order", "duplicated", "rejected", "limited",
-    "implausible", "trips"].map((key) => link[key]);
-  const cells = [name, LINK_STATES[link.state_now] ?? link.state_now, ...counts,
-    ms(link.round_trip_time_now), ms(link.round_trip_worst)];
+  const counts = ["out_of_order", "duplicated", "rejected", "limited", "implausible", "trips"];
+  const cells = [name, LINK_STATES[link.state_now] ?? link.state_now, link.missed, link.late,
+    ms(link.round_trip_time_now), ms(link.round_trip_worst), ...counts.map((key) => link[key])];
   cells.forEach((content, i) => {
     const cell = document.createElement("td");
     cell.className = i > 1 ? "n" : "";
