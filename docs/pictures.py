@@ -2,8 +2,8 @@
 
     .venv/bin/python docs/pictures.py [NAME...]     # in the folder of the checkout; make pictures
 
-Without a NAME, like hand or layers, all of them, in ten minutes. report.png takes Chromium, and
-timing.png a machine that is idle.
+Without a NAME, like hand or layers, all of them, in ten minutes. report.png and live.png take
+Chromium, and timing.png a machine that is idle.
 """
 
 import os
@@ -11,7 +11,9 @@ import re
 import shutil
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,6 +23,7 @@ import calibration_picture
 import delicate_picture
 import numpy as np
 import tutorials
+from browser import Browser
 from grasp_cosim import hand_system, simulate, tandem_system
 from grasp_cosim.base.files import write_text
 from grasp_cosim.grasp.presets import with_case
@@ -28,6 +31,7 @@ from grasp_cosim.grasp.published.evaluation_page import figures
 from grasp_cosim.grasp.published.reproduction import reproduce
 from grasp_cosim.grasp.system import grasp_system
 from grasp_cosim.hand.view import draw_hand as draw_three_fingers
+from grasp_cosim.live.live_page import LivePage
 from grasp_cosim.recording.read_back import load_run
 from grasp_cosim.report.plot import add_heading, new_figure, save_figure
 from grasp_cosim.report.system_html import connections_svg, stand_alone
@@ -115,6 +119,36 @@ def draw_report(folder: Path) -> None:
         )  # fmt: skip
 
 
+def draw_live(folder: Path) -> None:
+    """live.png: the live page of a grasp after a change, never twice the same."""
+    halt, name = threading.Event(), "sensor_2.reflectance"
+
+    def look(address: str) -> None:
+        try:
+            with Browser(1400, 1300) as browser:
+                browser.open(address)
+                browser.wait_for("document.documentElement.dataset.ready && recording.last > 5")
+                browser.evaluate(
+                    "(() => { const find = document.getElementById('find-parameter');"
+                    "find.value = 'reflectance'; find.dispatchEvent(new Event('input')); })()"
+                )
+                browser.evaluate(f"parameters.get('{name}').ask(0.7)")
+                browser.wait_for("recording.last > 7")
+                browser.evaluate("find('traces').scrollIntoView({ block: 'end' })")
+                browser.evaluate("scrollTo({ top: 300, behavior: 'instant' })")
+                browser.screenshot(folder / "live.png")
+        finally:
+            halt.set()
+
+    with LivePage(grasp_system().natively()) as page, ThreadPoolExecutor(1) as pool:
+        looking = pool.submit(look, page.address)
+        simulate(
+            page.system, step=1e-3, stop=600.0, realtime=True, listeners=[page.feed],
+            requests=page.requests, halt=halt,
+        )  # fmt: skip
+        looking.result()
+
+
 def draw_timing(folder: Path) -> None:
     """timing.png: how a run of this machine kept to the clock, never twice the same."""
     with TemporaryDirectory() as kept:
@@ -183,6 +217,7 @@ PICTURES: Mapping[str, tuple[Callable[[Path], None], Sequence[str]]] = {
     "three_layers": (draw_three_layers, ["three_layers.svg"]),
     "evaluation": (draw_evaluation, ["contact_times.png", "contact_forces.png"]),
     "report": (draw_report, ["report.png"]),
+    "live": (draw_live, ["live.png"]),
     "timing": (draw_timing, ["timing.png"]),
     "calibration": (calibration_picture.draw, ["calibration.png"]),
     "sweep": (draw_sweep_of_widths, ["sweep.png"]),

@@ -124,6 +124,7 @@ _FOR_LOWER_PACKAGES: tuple[tuple[Kind, str, str, str], ...] = (
     ("html", "Result", "report.html_tables", "result_html"),
     ("html", "System", "report.system_html", "system_html"),
     ("pictures", "Result", "report.plot", "plot_signals"),
+    ("readers", ".json", "recording.as_system", "read_run_as_system"),
     ("readers", ".ssp", "ssp.from_archive", "read_ssp"),
     ("twins", "System", "twins.twins", "natives"),
 )

@@ -133,7 +133,6 @@ NOT_A_SYSTEM = [
     ("plant.fmu", "an FMU", "`grasp-cosim run --swap COMPONENT=plant.fmu` runs that"),
     ("my.zip", "an FMU", "--as COMPONENT=my.zip`"),
     ("b.zip", "an SSP archive", "its name must end in .ssp"),
-    ("run/run.json", "a file of a run", REPORT),
     ("OspSystemStructure.xml", "a .xml file", ""),
     ("drive.csv", "a .csv file", "`grasp-cosim run --input drive.csv` drives"),
     (".", "a folder", ""),

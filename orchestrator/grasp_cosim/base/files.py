@@ -69,7 +69,7 @@ def check_file(path: Path) -> None:
 
 WANTED = {
     "fmu": "an FMU, a file",
-    "system": "a system, a .toml or .ssp file",
+    "system": "a system, a .toml or .ssp file, or the run.json of a run",
     "run": "a folder that `grasp-cosim run --out` wrote",
     "block": "a block, a Python file",
 }
@@ -105,7 +105,8 @@ def check_nature(path: Path, kind: str) -> None:
     """
     nature = _nature(path)
     archive = kind == "system" and nature == "an SSP archive" and path.suffix.lower() == ".ssp"
-    if nature and nature not in _TAKEN[kind] and not archive:
+    repeated = kind == "system" and nature == "a file of a run" and path.name == "run.json"
+    if nature and nature not in _TAKEN[kind] and not archive and not repeated:
         name = path.parent if nature == "a file of a run" else path
         advice = _ADVICE.get(nature, "").replace("{}", quote(str(name)))
         message = f"must be {WANTED[kind]}{advice and '; '}{advice}"

@@ -2,16 +2,18 @@
 
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..base.errors import InputError, RunInterruptedError, SimulationError
+from ..exchange.listener import Listener
 from ..master.simulation import simulate
 from ..recording.folder import FORMS, Form, RunFolder
 from ..recording.mdf import check_mdf
 from ..recording.result import Result
 from ..report import terminal
+from ..system.description import System
 from ..system.structure import SCHEMES
 from .frame import (
     INTERRUPTED,
@@ -38,6 +40,9 @@ from .options import (
     values_option,
 )
 
+if TYPE_CHECKING:
+    from ..live.live_page import LivePage
+
 
 @click.command()
 @click.argument("system", required=False, type=PATH)
@@ -61,6 +66,13 @@ from .options import (
 @native_option
 @click.option("--realtime", is_flag=True, help="Pace the run by the clock, and print its timing.")
 @click.option(
+    "--show",
+    "shows_page",
+    is_flag=True,
+    help="With --realtime: serve a page on this computer that shows the run and changes its "
+    "parameters while it goes on. The command prints the address.",
+)
+@click.option(
     "--every", type=click.IntRange(1), default=1, metavar="N", help="Record only every N-th step."
 )
 @click.option("-o", "--out", type=PATH, help="Folder for the signals and run.json.")
@@ -82,6 +94,7 @@ def run(
     metric_files: tuple[Path, ...],
     native: bool | None,
     realtime: bool,
+    shows_page: bool,
     every: int,
     out: Path | None,
     form: Form,
@@ -92,15 +105,20 @@ def run(
 ) -> int:
     """Run a system once.
 
-    SYSTEM is a .toml or .ssp file. The default is the built-in grasp. The command prints the
-    metrics. The exit code is 1 if the verdict of the system fails or no signal is recorded.
+    SYSTEM is a .toml or .ssp file, or the run.json of a run, which is repeated. The default is the
+    built-in grasp. The command prints the metrics. The exit code is 1 if the verdict of the system
+    fails or no signal is recorded.
 
     \b
     Example: grasp-cosim run --case 1 --out results --plot
     Change a value: grasp-cosim run --set plant.initial_object_position=0.02
     Record other signals: grasp-cosim run --record 'plant.*,controller.force[1]'
     Run in real time: grasp-cosim run --realtime --step 1e-3 --out results
+    Change parameters on the way: grasp-cosim run --realtime --show --stop 60 --out results
+    Repeat that run: grasp-cosim run results/run.json --out repeated
     """
+    if shows_page and not realtime:
+        raise InputError("--show: needs --realtime, the run that the page follows")
     if mdf and not out:
         raise InputError("--mdf: needs --out, the folder for signals.mf4")
     if form != "csv" and not out:
@@ -115,6 +133,9 @@ def run(
         check_mdf()
     check_outputs(out, plot)
     chosen = natively(system, native)
+    page = _page_of(chosen, every) if shows_page else None
+    if page:
+        chosen = page.system
     command = ("grasp-cosim", *click.get_current_context().find_root().obj)
     with RunFolder(out, chosen, command, realtime, form=form) if out else nullcontext() as folder:
 
@@ -125,17 +146,30 @@ def run(
             elif out:
                 say(f"kept what was recorded, in {out}")
 
+        listeners: list[Listener] = [folder] if folder else []
+        if page:
+            listeners.append(page.feed)
+
+        def note(line: str) -> None:
+            say(line)
+            if page:
+                page.note(line)
+
         try:
-            result = simulate(
-                chosen,
-                progress=not is_quiet(),
-                every=every,
-                listeners=[folder] if folder else (),
-                realtime=realtime,
-                metrics=metrics,
-                note=say,
-                finish=finish,
-            )
+            with page or nullcontext():
+                if page:
+                    say(f"live: {page.address}", always=True)
+                result = simulate(
+                    chosen,
+                    progress=not is_quiet(),
+                    every=every,
+                    listeners=listeners,
+                    realtime=realtime,
+                    metrics=metrics,
+                    note=note,
+                    finish=finish,
+                    requests=page.requests if page else None,
+                )
         except RunInterruptedError as interrupted:
             result = interrupted.result
     if not result.came_to_its_end:
@@ -146,6 +180,13 @@ def run(
             say(f"verdict: {criterion}")
     is_recorded = result.signals and len(result.time)
     return 0 if is_recorded and result.passed else NEGATIVE  # a line above gives the reason
+
+
+def _page_of(system: System, every: int) -> "LivePage":
+    """The page that is to follow the run of a system."""
+    from ..live.live_page import LivePage  # only here: most runs have none
+
+    return LivePage(system, every)
 
 
 def _write(

@@ -25,6 +25,7 @@ from .listener import (
     Floats,
     Leisurely,
     Listener,
+    OfAllRows,
     OfWindows,
     Selective,
     Signal,
@@ -101,6 +102,8 @@ class Dispatcher:
         self.pending: tuple[Steps, Floats] | None = None
         """The last row, where decimation has left it out so far."""
         trigger = system.record.trigger
+        self._of_all_rows = [x for x in listeners if trigger and isinstance(x, OfAllRows)]
+        self._of_recorded_rows = [x for x in listeners if x not in self._of_all_rows]
         self.trigger = TriggeredRows(system, trigger, slots) if trigger else None
         """What decides on the rows of a triggered recording; None of any other."""
         self._begun = False
@@ -139,7 +142,10 @@ class Dispatcher:
         nth = slice(-int(steps[0]) % self._every, None, self._every)
         if self.trigger:
             self._begin_run()
-            self.trigger(self, steps, rows, steps[nth], self._recorded(rows[nth]))
+            recorded = self._recorded(rows[nth])
+            for listener in self._of_all_rows:
+                listener.block(steps[nth], recorded)
+            self.trigger(self, steps, rows, steps[nth], recorded)
         elif len(steps[nth]):
             self.hand_on(steps[nth], self._recorded(rows[nth]))
         if steps[-1] % self._every and (self.trigger is None or self.trigger.is_open):
@@ -240,7 +246,7 @@ class Dispatcher:
     def hand_on(self, steps: Steps, rows: Floats) -> None:
         """Hand rows that are recorded on to the listeners."""
         start = time.perf_counter()
-        for listener in self._listeners:
+        for listener in self._of_recorded_rows:
             listener.block(steps, rows)
         self.listener_seconds += time.perf_counter() - start
 

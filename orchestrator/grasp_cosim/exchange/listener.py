@@ -138,6 +138,15 @@ class OfWindows(Listener, Protocol):
         """Called after its last row."""
 
 
+@runtime_checkable
+class OfAllRows(Listener, Protocol):
+    """A listener that gets the rows between the windows of a triggered run, too."""
+
+    @property
+    def is_of_all_rows(self) -> bool:
+        """True."""
+
+
 class Selective(Listener, Protocol):
     """A listener that gets the signals of some names only."""
 

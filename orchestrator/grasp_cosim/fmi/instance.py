@@ -31,6 +31,10 @@ AT_POINT = 1e-10
 """s, a tenth of the unit of time: an event so near to a communication point is at that."""
 
 
+class RefusedValueError(SimulationError):
+    """An FMU refused a value with the status discard: it keeps the older one, and may go on."""
+
+
 CLOCK = ("begin", "number", "end")
 """What a stepper is told of a step: the time at which it begins in s, its number, the time at which
 it ends.
@@ -87,7 +91,8 @@ class Instance(Protocol):
     def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
         """Set inputs or tunable parameters. For use outside the loop.
 
-        Of an array that is set in part, the other elements keep what they were set to last.
+        Of an array that is set in part, the other elements keep what they were set to last. A
+        SimulationError where the FMU fails, a RefusedValueError where it keeps the older values.
         """
 
     def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:

@@ -39,7 +39,17 @@ from .fmpy_private import (
     library_file,
     with_known_signatures,
 )
-from .instance import EARLY, ERROR, FATAL, OK, STATUS, WARNING, Inputs
+from .instance import (
+    DISCARD,
+    EARLY,
+    ERROR,
+    FATAL,
+    OK,
+    STATUS,
+    WARNING,
+    Inputs,
+    RefusedValueError,
+)
 from .messages import SEVERE, Messages
 from .numbers import state_numbers, take_numbers
 from .states import States
@@ -332,7 +342,7 @@ class LoadedInstance(ABC):
             ]
 
     def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
-        with self._failures():
+        with self._failures(), self._refused_values():
             self._assign(zip(variables, values, strict=True))
 
     def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
@@ -583,6 +593,20 @@ class LoadedInstance(ABC):
             raise self.failure(error.status, self._time()) from error
         except MissingFunctionError as error:
             raise self._incomplete(error) from error
+
+    @contextmanager
+    def _refused_values(self) -> Iterator[None]:
+        """Turns the status discard of a setter into a RefusedValueError: the FMU is still used."""
+        try:
+            yield
+        except FMICallException as error:
+            if error.status != DISCARD:
+                raise
+            reason = as_reason(self._messages.reasons())
+            raise RefusedValueError(
+                f"{self.name}: {self.interface.file_name} refused a value at t = "
+                f"{self._time():.9g} s, and keeps the older one{reason}"
+            ) from error
 
     def _incomplete(self, error: MissingFunctionError) -> InputError:
         """The error for a binary that lacks a function."""

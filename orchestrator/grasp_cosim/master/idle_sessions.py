@@ -76,7 +76,7 @@ class RepeatableSession(Session):
         size = 8 * self.system.total_steps * len(self._record.signals)
         return (
             size <= MAX_BYTES
-            and not (self.pacer or self._has_listeners or self._log.is_told)
+            and not (self.pacer or self._has_listeners or self._log.is_told or self._requests)
             and all(map(is_reset_exactly, self.system.components))
         )
 

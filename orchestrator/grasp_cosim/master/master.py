@@ -32,6 +32,7 @@ from .exchanged import exchanged
 from .exchanges import begin, exchanges_of
 from .fault_windows import NO_CUTS, Cut
 from .plan import Planner
+from .requests import Requests
 from .rows import RowBuffer
 from .scenario import Scenario
 from .start import Starter
@@ -68,6 +69,7 @@ class Master:
         engine: Engine = "auto",
         renew: Callable[[], Sequence[Instance]] | None = None,
         cuts: Mapping[Port, Cut] = NO_CUTS,
+        requests: Requests | None = None,
     ) -> None:
         """Bind the instances of a system, before their initialisation.
 
@@ -78,6 +80,7 @@ class Master:
             engine: "python", "compiled" or "auto".
             renew: Closes the instances and loads others, for a loop that is initialised again.
             cuts: Functions by the input at which each opens a loop.
+            requests: What other threads ask for.
         """
         self.system = system
         self.instances = tuple(instances)
@@ -90,6 +93,7 @@ class Master:
         self.peers: dict[str, dict[str, str]] = {}
         """The name and the build of the peer of each proxy."""
         self._receive, self.engine, self._renew_instances = receive, engine, renew
+        self._requests = requests
         self._grid = system.time_grid
         self._earlier_warnings: list[str] = []
         """Those of instances that were closed as the loop was initialised again."""
@@ -256,9 +260,9 @@ class Master:
     def _run_loop(self, stop: int) -> None:
         """Run the loop until stop, or a pause; finish the steps that it leaves unfinished."""
         step, operation = self.steps_done, 0
-        rows, end = self._rows, self.end
+        rows = self._rows
         try:
-            while step < (until := min(stop, end.total_steps, end.pause)):
+            while step < (until := self._until(stop, step, operation)):
                 step, operation, status = self._loop(
                     rows.rows, operation, step, until, *self._grid, row=rows.place(step)
                 )
@@ -268,6 +272,21 @@ class Master:
                     operation += 1
         finally:  # an interruption of the loop does not say how far it came; the pacer knows more
             self.steps_done = max(step, rows.handed_on)
+
+    def _until(self, stop: int, step: int, operation: int) -> int:
+        """The step at which the loop is to stop, at the latest at stop; before, requests are done.
+
+        That is at the beginning of a step only, before its first operation.
+        """
+        until = min(stop, self.end.total_steps, self.end.pause)
+        if self._requests is None or step >= until:
+            return until
+        if operation == 0:
+            if self._requests.are_waiting:
+                self.scenario.take(self._requests, step)
+            if self.scenario.request_due == step:
+                self.scenario.before_step(step)
+        return int(min(until, self.scenario.request_due))
 
     def saved(self) -> Any:
         """All that decides what comes, and the rows that wait, for restore().

@@ -22,6 +22,7 @@ from . import loop
 from .engine import Aside, CompiledLoop, Engine
 from .fault_windows import NO_CUTS, Cut
 from .master import CHUNK, LONG, Master, RowReceiver
+from .requests import Requests
 
 MAX_ROWS_ASIDE = 1 << 15
 """The most steps between two times that rows are handed on, where another thread does it."""
@@ -44,12 +45,13 @@ class PacedMaster(Master):
         engine: Engine = "auto",
         renew: Callable[[], Sequence[Instance]] | None = None,
         cuts: Mapping[Port, Cut] = NO_CUTS,
+        requests: Requests | None = None,
     ) -> None:
         """As of a Master; the pacer says when each step begins."""
         self._pacer, self._extra_values = pacer, pacer.width
         self.meanwhile: Callable[[], None] = lambda: None
         """Called while the loop goes on without Python's lock."""
-        super().__init__(system, instances, receive, engine, renew, cuts)
+        super().__init__(system, instances, receive, engine, renew, cuts, requests)
         self._cpus = cpus() if self.runs_alone else []
 
     def _make_loop(self) -> None:
@@ -115,13 +117,13 @@ class PacedMaster(Master):
             if pacer.spare is not None:
                 pacer.spare(SPARE)
             self.meanwhile()
-            if pacer.halted():
+            if pacer.halted() or (requests is not None and requests.are_waiting):
                 halt()
 
-        rows, grid = self._rows, self._grid
+        rows, grid, requests = self._rows, self._grid, self._requests
         try:
             with Aside(hand_on, halt, self._cpus) as aside:
-                while step < (until := min(stop, self.total_steps, self.end.pause)):
+                while step < (until := self._until(stop, step, operation)):
                     step, operation, status = compiled(
                         rows.rows, operation, step, until, *grid, row=rows.place(step), ring=True
                     )

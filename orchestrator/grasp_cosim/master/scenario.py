@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.checks import exact
-from ..fmi.instance import Instance
+from ..base.errors import InputError
+from ..fmi.instance import Instance, RefusedValueError
 from ..interface.expansion import parse_values
 from ..interface.fmi_types import Value
 from ..interface.units import IDENTITY
@@ -25,11 +26,12 @@ from ..system.description import System
 from ..system.names import main_port
 from ..system.parts import Condition, Event, Port, literal
 from ..system.scenario import parse_set_values
-from ..system.times import first_step, seconds
+from ..system.times import first_step, in_seconds, seconds
 from .drives import Tuning, of_kind, stored, tunings_of
 from .exchanged import exchanged, sourced
 from .fault_windows import NO_CUTS, Cut, Window, fault_functions
 from .occurrence import Occurrence
+from .requests import Answer, Request, Requests
 
 _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
@@ -121,6 +123,9 @@ class Scenario:
         self.fault_functions = fault_functions(windows, system.step_ns, cuts)
         self.tunings = tunings_of(system)
         self._due = self._next_step(0)
+        self.done_requests: list[Event] = []
+        """The requests that were done, as events at their communication points."""
+        self._requested: list[Occurrence] = []
         self._settable: dict[str, Port] = {}
         self._scalars: dict[str, SettableNumber] = {}
 
@@ -135,6 +140,59 @@ class Scenario:
         self._pending.append(
             Occurrence(first, math.inf, period, event.when, happen, not_happened, sets=True)
         )
+
+    @property
+    def request_due(self) -> float:
+        """The first step at which a request is due; infinite where there is none."""
+        return min((occurrence.first for occurrence in self._requested), default=math.inf)
+
+    def take(self, requests: Requests, step: int) -> None:
+        """Have requests done before the first step from this one on that their component takes.
+
+        They come behind the events of the system, in their order. One that its FMU refuses is
+        answered by an InputError, and the run goes on.
+        """
+        for request in requests.take():
+            period = self._system.period(request.port.component)
+            due = -(-step // period) * period
+            event = Event({request.port: request.value})
+            try:
+                act = self._setter("set", event)
+            except InputError as error:  # a number that its slot does not hold
+                requests.settle(request, error)
+                continue
+            happen = partial(self._do, requests, request, act)
+            occurrence = Occurrence(due, math.inf, period, None, happen)
+            self._requested.append(occurrence)
+            self._pending.append(occurrence)
+            self._due = min(self._due, due)
+
+    def _do(
+        self,
+        requests: Requests,
+        request: Request,
+        happen: Callable[[int], Sequence[str]],
+        step: int,
+    ) -> Sequence[str]:
+        """Do a request at a step, and answer it; the lines for the log."""
+        port, self._requested = request.port, [o for o in self._requested if o.first > step]
+        try:
+            lines = happen(step)
+        except RefusedValueError as error:
+            requests.settle(request, InputError(f"set: {port}: {error}"))
+            return ()
+        except Exception as error:
+            requests.settle(request, error)
+            raise
+        time = self._system.time_ns(step)
+        self.done_requests.append(Event({port: request.value}, at_ns=math.floor(time)))
+        self._applied.pop(port, None)
+        self._applied[port] = happen
+        instance = self._instances[port.component]
+        (value,) = instance.get([instance.interface.by_name[port.variable]])
+        line = LogLine(step, lines[0]).with_times(self._system)
+        requests.settle(request, Answer(in_seconds(time), value, line))
+        return lines
 
     @property
     def log(self) -> list[str]:

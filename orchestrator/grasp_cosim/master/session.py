@@ -30,6 +30,7 @@ from ..system.declared_steps import check_declared_steps
 from ..system.description import System, as_system
 from ..system.overrides import as_overrides
 from ..system.parts import Component, Port, Realtime, as_signal
+from ..system.settings import with_events
 from ..system.times import TimeInput, in_seconds
 from ..twins.twins import twins_of_run
 from .engine import Engine
@@ -37,6 +38,7 @@ from .fault_windows import NO_CUTS, Cut
 from .master import Master
 from .paced import PacedMaster
 from .process_guard import guarded_process, leaves_process_alone, same_folder
+from .requests import Requests
 from .run_log import RunLog
 from .run_record import RunRecord
 
@@ -106,6 +108,7 @@ class Session:
         cuts: Mapping[Port, Cut] = NO_CUTS,
         halt: threading.Event | None = None,
         steered: bool = True,
+        requests: Requests | None = None,
     ) -> None:
         """Load the FMUs of a system and initialise them.
 
@@ -132,6 +135,7 @@ class Session:
             halt: The event that is then the attribute of this name.
             steered: Says that set() may be called, so that inputs without a source are recorded by
                 default.
+            requests: What other threads ask to be set: see requests.Requests.
 
         Raises:
             InputError: An argument is wrong, or an FMU does not load or refuses its parameters.
@@ -144,6 +148,7 @@ class Session:
         self._record = RunRecord(system, metrics, every, bool(realtime))
         self._has_listeners = bool(listeners)
         self._finish = finish
+        self._requests = requests
         self._wall_time = 0.0
         self._failed = False
         self._failure: SimulationError | None = None
@@ -162,6 +167,9 @@ class Session:
         self._start: tuple[Any, Sequence[Any]] | None = None
         """The saved states of the master and the record at the start, after a reset."""
         self._stack = ExitStack()
+        if requests is not None:
+            self._stack.callback(requests.close)
+            requests.meter = self.pacer.meter if self.pacer else None
         check_declared_steps(system)
         waits = long_waits(system, self.pacer.realtime) if self.pacer else []
         self._log = RunLog(system, self._record, waits, note)
@@ -187,12 +195,12 @@ class Session:
                 begin_trace(component.name, component.trace)
         with phase(f"loading {len(self.system.components)} FMUs"):
             self._load_instances()
-        rows_to, renew = self._record.receive, self._renew_instances
+        rows_to, renew, requests = self._record.receive, self._renew_instances, self._requests
         instances = self._instances
         self.master = (
-            PacedMaster(self.system, instances, rows_to, self.pacer, engine, renew, cuts)
+            PacedMaster(self.system, instances, rows_to, self.pacer, engine, renew, cuts, requests)
             if self.pacer
-            else Master(self.system, instances, rows_to, engine, renew, cuts)
+            else Master(self.system, instances, rows_to, engine, renew, cuts, requests)
         )
         master = self.master
         self._record.begin(master.slots, master.texts, master.bounds, listeners)
@@ -497,6 +505,8 @@ class Session:
     def _check_that_it_can_go_back(self) -> None:
         if self.pacer:
             raise InputError(f"{self.system.name}: a run in real time cannot go back")
+        if self._requests is not None:
+            raise InputError(f"{self.system.name}: a run that takes requests cannot go back")
         if self._has_listeners:
             raise InputError(
                 f"{self.system.name}: listeners cannot give rows back; must be a session without"
@@ -620,7 +630,7 @@ class Session:
             privileges = self._privileges
             timing = self.pacer.meter.timing(privileges.granted, privileges.refused)
         result = Result(
-            record.settings,
+            with_events(record.settings, master.scenario.done_requests),
             time,
             columns,
             units,

@@ -21,6 +21,7 @@ from ..system.times import TimeInput, in_seconds
 from . import idle_sessions
 from .engine import Engine
 from .idle_sessions import RepeatableSession
+from .requests import Requests
 from .session import Finish, Session, State, with_twins
 
 __all__ = ["Session", "State", "simulate"]
@@ -71,6 +72,7 @@ def simulate(
     finish: Finish | None = None,
     until: Until | None = None,
     halt: threading.Event | None = None,
+    requests: Requests | None = None,
 ) -> Result:
     """Run a system to its stop time, and return what was recorded at its communication points.
 
@@ -106,6 +108,8 @@ def simulate(
             system file does the same for a condition that is known before, in the loop itself.
         halt: Set by another thread, it ends the run at a communication point, in good order. The
             result is then not complete.
+        requests: What other threads ask to be set, which are events of the result then: see
+            master.requests.
 
     Returns:
         The result with signals of the shape (rows,) by name, in the units of their FMUs, on
@@ -138,7 +142,8 @@ def simulate(
     def fits(session: RepeatableSession) -> bool:
         return session.is_for(system, every, engine, metrics)
 
-    idle = None if listeners or realtime or note or until else idle_sessions.take(fits)
+    one_of_a_kind = listeners or realtime or note or until or requests
+    idle = None if one_of_a_kind else idle_sessions.take(fits)
     try:
         with ExitStack() as stack:
             session = idle or RepeatableSession(
@@ -152,6 +157,7 @@ def simulate(
                 finish=keep,
                 halt=halt,
                 steered=False,
+                requests=requests,
             )
             stack.callback(session.close)
             if idle:

@@ -187,6 +187,14 @@ class _Judged(NamedTuple):
     """What each part took in each step."""
 
 
+class SoFar(NamedTuple):
+    """Steps that ended after their deadline; the longest, and the latest begin of one, in s."""
+
+    overruns: int
+    longest: float
+    latest: float
+
+
 class Meter:
     """The statistics of one run."""
 
@@ -207,7 +215,7 @@ class Meter:
         self._periods = {name: system.period(name) for name in components}
         self._file = TemporaryFile(prefix="grasp_times_")  # noqa: SIM115 - open as long as this
         finalize(self, self._file.close)
-        self._first = self._rows = self._overruns = self._worst = 0
+        self._first = self._rows = self._overruns = self._worst = self._latest = 0
         self._arrival_after: tuple[int, int] | None = None
         """When the step after the last one would have begun, and how late."""
         self._recordings = array("q"), array("q")
@@ -221,6 +229,7 @@ class Meter:
         self._rows += len(rows)
         self._overruns += int(np.count_nonzero(rows[:, LATE] > 0.0))
         self._worst = max(self._worst, int((rows[:, -1] - rows[:, BEGIN]).max()))
+        self._latest = max(self._latest, int((rows[:, BEGIN] - rows[:, SCHEDULED]).max()))
 
     def end(self, arrived: int, late: int) -> None:
         """No step follows the last one; the next one would have begun then, and so late."""
@@ -245,6 +254,10 @@ class Meter:
         """Return the state of the run in a few words."""
         factor, worst = self._real_time_factor(), self._worst / 1e6
         return f"{factor:.3g}x, worst step {worst:.3g} ms, {self._overruns} overruns"
+
+    def so_far(self) -> SoFar:
+        """Return the figures that any thread may ask for while the run goes on."""
+        return SoFar(self._overruns, self._worst / NANOSECONDS, self._latest / NANOSECONDS)
 
     def timing(self, granted: Sequence[str], refused: Sequence[str]) -> Timing:
         """Return the timing so far, with the answers of the operating system."""

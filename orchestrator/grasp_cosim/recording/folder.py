@@ -20,7 +20,7 @@ import numpy.typing as npt
 from ..base.errors import InputError, SimulationError
 from ..base.files import make_folder, of_any_format, remove, unwritable
 from ..base.registry import names
-from ..base.scratch import SUFFIX, Lock
+from ..base.scratch import PREFIX, SUFFIX, Lock
 from ..base.typed_json import Decoder, json_in
 from ..exchange.listener import Experiment, Listener, Signal, Window
 from ..metrics.in_si import in_si
@@ -81,11 +81,13 @@ class RunFolder:
         folder = Path(folder)
         self._folder, self._paced = folder, paced
         self._place = folder.absolute()  # an FMU may go elsewhere
-        self._origin = origin(of.components, command)
+        self._origin = origin(of.components, command, self._place)
         if isinstance(of, RecordedRun):
-            self._origin |= of.origin
+            self._origin |= _from(of, self._place)
             self._to_si = dict(of.to_si)
         else:
+            if of.input and of.input.path:
+                self._origin["input_path"] = _path_from(self._place, of.input.path)
             conversions = in_si(of, ()).conversions
             self._to_si = {name: c for name, c in conversions.items() if name in of.recorded_names}
         self._form = form
@@ -192,7 +194,7 @@ class RunFolder:
     def _write_settings(self, result: RecordedRun, window: str = "") -> None:
         origin = dict(self._origin)
         if result.components:
-            origin["fmus"] = fmus_of(result.components)
+            origin["fmus"] = fmus_of(result.components, self._place / window)
         replace(result, origin=origin).to_json(self._place / window / SETTINGS)
 
     def _write(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
@@ -352,6 +354,25 @@ def _groups(settings: Path) -> Sequence[str]:
     return names("groups") if older is None else older.get("metrics", [])
 
 
+def _from(run: RecordedRun, folder: Path) -> dict[str, Any]:
+    """The origin of a run, its paths from another folder where they are from its own."""
+    origin = dict(run.origin)
+    if run.folder is None:
+        return origin
+
+    def moved(path: str) -> str:
+        return _path_from(folder, Path(run.folder or "", path))
+
+    if "fmus" in origin:
+        origin["fmus"] = {
+            name: {**fmu, "path": moved(fmu["path"])} if "path" in fmu else fmu
+            for name, fmu in origin["fmus"].items()
+        }
+    if "input_path" in origin:
+        origin["input_path"] = moved(origin["input_path"])
+    return origin
+
+
 def now() -> datetime:
     """Return the time, or that of SOURCE_DATE_EPOCH, where the environment has it.
 
@@ -366,8 +387,11 @@ def now() -> datetime:
         raise InputError(f"SOURCE_DATE_EPOCH={epoch}: must be the seconds since 1970") from error
 
 
-def origin(components: Sequence[Component], command: Sequence[str]) -> dict[str, Any]:
-    """The date now, the versions of what makes the run, which FMUs those are, and the command."""
+def origin(components: Sequence[Component], command: Sequence[str], folder: Path) -> dict[str, Any]:
+    """The date now, the versions of what makes the run, which FMUs those are, and the command.
+
+    The folder is that of the run, from which the paths of the FMUs are.
+    """
     from importlib.metadata import version
 
     return {
@@ -376,23 +400,31 @@ def origin(components: Sequence[Component], command: Sequence[str]) -> dict[str,
             "python": platform.python_version(),
             **{name: version(name) for name in ("grasp-cosim", "numpy", "fmpy")},
         },
-        "fmus": fmus_of(components),
+        "fmus": fmus_of(components, folder),
         "command": list(command),
     }
 
 
-def fmus_of(components: Sequence[Component]) -> dict[str, dict[str, Any]]:
-    """Which FMUs run, by component."""
-    fmus = {
-        c.name: {"guid": c.loaded.guid, "tool": c.loaded.tool, "sha256": _hash(c.loaded.path)}
+def fmus_of(components: Sequence[Component], folder: Path) -> dict[str, dict[str, Any]]:
+    """Which FMUs run, by component; their paths from the folder, but in a temporary one."""
+    fmus: dict[str, dict[str, Any]] = {
+        c.name: {"guid": c.loaded.guid, "tool": c.loaded.tool, "sha256": file_hash(c.loaded.path)}
         for c in components
     }
+    for c in components:
+        if c.fmu.exists() and not any(part.startswith(PREFIX) for part in c.fmu.parts):
+            fmus[c.name]["path"] = _path_from(folder, c.fmu)
     for c in components:
         if c.native:  # the FMU whose place it takes
             fmus[c.name]["native_twin_of"] = c.interface.guid
     return fmus
 
 
-def _hash(path: Path) -> str | None:
+def _path_from(folder: Path, path: Path) -> str:
+    """The way from a folder to a file, without links, which it would not lead through."""
+    return os.path.relpath(os.path.realpath(path), os.path.realpath(folder))
+
+
+def file_hash(path: Path) -> str | None:
     """The SHA-256 of a file; None of what is a folder."""
     return sha256(path.read_bytes()).hexdigest() if path.is_file() else None

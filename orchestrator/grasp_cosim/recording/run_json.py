@@ -213,6 +213,7 @@ class MadeBeside(TypedDict, total=False):
     realtime: Mapping[str, Setting | None]
     limits: list[LimitEntry]
     acceptance: AcceptanceEntry
+    steered: bool
 
 
 class FmuEntry(TypedDict, total=False):
@@ -222,6 +223,7 @@ class FmuEntry(TypedDict, total=False):
     tool: str | None
     native_twin_of: str
     sha256: str | None
+    path: str
 
 
 class Origin(TypedDict, total=False):
@@ -231,6 +233,7 @@ class Origin(TypedDict, total=False):
     date: str
     versions: Mapping[str, str]
     fmus: Mapping[str, FmuEntry]
+    input_path: str
     command: list[str]
 
 

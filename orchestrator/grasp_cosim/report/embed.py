@@ -64,9 +64,16 @@ def excerpt_of(
 def _extremes(values: npt.NDArray[Any], block_rows: int) -> npt.NDArray[Any]:
     """The lowest and highest value of each block as they come, and the last value."""
     blocks = np.pad(values, (0, -len(values) % block_rows), mode="edge")
-    blocks = blocks.reshape(-1, block_rows)
-    pairs = np.sort(np.column_stack((blocks.argmin(axis=1), blocks.argmax(axis=1))), axis=1)
-    return np.append(np.take_along_axis(blocks, pairs, axis=1), values[-1])
+    return np.append(lowest_and_highest(blocks.reshape(-1, block_rows)), values[-1])
+
+
+def lowest_and_highest(blocks: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return the lowest and the highest value of each block, in the order in which they came.
+
+    Blocks are along the first axis, their rows along the second; further ones are columns.
+    """
+    places = np.stack((blocks.argmin(axis=1), blocks.argmax(axis=1)), axis=1)
+    return np.take_along_axis(blocks, np.sort(places, axis=1), axis=1)
 
 
 def packed(values: npt.NDArray[Any]) -> str:

@@ -164,7 +164,7 @@ def _state(result: Result, excerpt: Excerpt, scene: Scene | None) -> dict[str, A
     csv_header = ",".join(quoted(name) for name in ("time", *result.signals))
     return {
         "rows": len(excerpt.time),
-        "signals": [_signal_state(result, k, name) for k, name in enumerate(result.signals)],
+        "signals": [signal_state(result, k, name) for k, name in enumerate(result.signals)],
         "shown": first_signals or main_signals(result, MAX_FIRST_SIGNALS),
         **signal_styles(scene),
         "header": csv_header,
@@ -181,7 +181,7 @@ def _marks(result: Result, scene: Scene | None) -> list[dict[str, Any]]:
     return [{"t": time, "color": color} for time, color in marks]
 
 
-def _signal_state(result: Result, k: int, name: str) -> dict[str, Any]:
+def signal_state(result: Result, k: int, name: str) -> dict[str, Any]:
     """Return the data on the signal of this name, the k-th of the run, for the scripts.
 
     Of Strings that are the texts that their numbers stand for, and the cells of a CSV with them.

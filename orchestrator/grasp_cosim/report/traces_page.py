@@ -23,6 +23,9 @@ import numpy.typing as npt
 from .embed import packed
 from .wording import Caption
 
+IN_ONE_FILE = "Everything on this page is inside this one file."
+"""The end of a page that is a file."""
+
 
 @dataclass(frozen=True)
 class Zoom:
@@ -39,8 +42,9 @@ class Scene:
     """A section for one kind of system, and how its signals are shown: colours, marks, buttons.
 
     `html` is the content of its section under `title`. `scripts` define startScene(state), which
-    returns what draws it and plays it: {draw(), toggle()}. A colour is the name of a CSS variable
-    that `style` or the page defines.
+    returns what draws it and plays it: {draw(), toggle(), renew(state, series)}. The last takes the
+    state and the signals of a run that goes on, as they are now. A colour is the name of a CSS
+    variable that `style` or the page defines.
     """
 
     title: str
@@ -70,6 +74,7 @@ def traces_page(
     data: str,
     script: Sequence[str],
     style: str = "",
+    footer: str = IN_ONE_FILE,
 ) -> str:
     """Return a page with traces as text.
 
@@ -81,6 +86,7 @@ def traces_page(
         data: The HTML of columns_html().
         script: The scripts that come between those of the traces and main.js.
         style: What comes after the style that all pages have.
+        footer: A sentence at its end.
     """
     return _page(
         caption,
@@ -90,6 +96,7 @@ def traces_page(
         data,
         "\n".join([traces_script(), *script, scripts("main")]),
         style,
+        footer,
     )
 
 
@@ -106,6 +113,7 @@ def _page(
     data: str = "",
     script: str = "",
     style: str = "",
+    footer: str = IN_ONE_FILE,
 ) -> str:
     links = "".join(f'<a href="#{name}">{head}</a>' for name, (head, _) in sections.items())
     elements = [
@@ -120,6 +128,7 @@ def _page(
         contents=links,
         sections="\n".join(elements),
         version=escape(version("grasp-cosim")),
+        footer=escape(footer),
         page=state,
         data=data,
         script=script,

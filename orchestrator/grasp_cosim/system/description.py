@@ -42,7 +42,7 @@ from .validity import (
 LOGGER = logging.getLogger(__name__)
 """Gets what a system does without."""
 
-ARCHIVE = ".ssp"
+ARCHIVE, OF_RUN = ".ssp", ".json"
 
 FILES = (".toml", ARCHIVE)
 """The suffixes of files that have a system."""
@@ -182,10 +182,10 @@ class System(Structure):
         input: str | Path | Stimuli | None = None,  # noqa: A002 - as in the file and on the command line
         variant: str | None = None,
     ) -> System:
-        """Read the system of a TOML file or of an SSP archive.
+        """Read the system of a TOML file, of an SSP archive, or of the run of a run.json.
 
         Args:
-            path: The file, .toml or .ssp.
+            path: The file, .toml or .ssp, or the run.json of a run.
             fmus: The folder of the FMUs of a TOML file, by default its own; an archive has its own
                 FMUs.
             step: The communication step in s, in place of that of the file.
@@ -201,7 +201,7 @@ class System(Structure):
         Raises:
             InputError: The file cannot be read, or something in it is wrong.
         """
-        if fmus is not None and is_archive(path):
+        if fmus is not None and Path(path).suffix.lower() in (ARCHIVE, OF_RUN):
             raise InputError(f"{path}: has its own FMUs; those in {fmus} cannot take their place")
         times = _of_experiment({"start": start, "step": step, "stop": stop})
         system = read_system(path, times, fmus, _stimuli(input), variant)
@@ -567,7 +567,7 @@ def read_system(
     stimuli: Stimuli | None = None,
     variant: str | None = None,
 ) -> System:
-    """The system as a TOML file or an SSP archive has it, but for its stimuli.
+    """The system as a TOML file, an SSP archive or a run.json has it, but for its stimuli.
 
     times override the start, step and stop that an archive of another tool has, which may leave
     them open; all else that is read gets them by with_overrides(). variant names the structure of
@@ -575,11 +575,12 @@ def read_system(
     """
     path = Path(path)
     check_nature(path, "system")
-    if not is_archive(path):
+    suffix = path.suffix.lower()
+    if suffix not in (ARCHIVE, OF_RUN):
         if variant is not None:
             raise InputError(f"{path}: variant = {variant!r}: only an .ssp may have variants")
         return System(**read_toml(path, Path(fmus) if fmus else None, stimuli))
-    system: System = registered("readers", ARCHIVE)(path, times, stimuli, variant)
+    system: System = registered("readers", suffix)(path, times, stimuli, variant)
     return system
 
 

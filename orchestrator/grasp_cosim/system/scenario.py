@@ -201,7 +201,7 @@ def check_scenario(system: Structure) -> None:
         if (event.at_ns is None) == (event.when is None):
             raise InputError(f"{place}: must have either at, a time in s, or when, a condition")
         if not event.set:
-            raise InputError(f"{place}: set is empty; valid: {choices(_settable(system))}")
+            raise InputError(f"{place}: set is empty; valid: {choices(settable_ports(system))}")
         _check_condition(system, event.when, f"{place}: when")
         for port, value in event.set.items():
             parse_set_values(system, port, value, f"{place}: set.{port}")
@@ -213,7 +213,7 @@ def check_scenario(system: Structure) -> None:
         _check_condition(system, trigger.when, f"{system.name}: record.trigger")
 
 
-def _settable(system: Structure) -> dict[Port, Variable]:
+def settable_ports(system: Structure) -> dict[Port, Variable]:
     """The ports an event may set: tunable parameters and inputs without a source."""
     connected = {*(connection.target for connection in system.connections), *driven(system)}
     return {
@@ -232,12 +232,12 @@ def parse_set_values(system: Structure, port: Port, value: Given, place: str) ->
     InputError where it cannot be set then.
     """
     interface = system.component(port.component, place).interface
-    settable = _settable(system)
+    settable = system.once(settable_ports)
     if not settable.keys() >= {*system.elements(port)}:
-        settable_ports = [str(p) for p in settable if p.component == port.component]
+        of_component = [str(p) for p in settable if p.component == port.component]
         near = (
-            nearest(port, settable_ports, interface.listing)
-            if settable_ports
+            nearest(port, of_component, interface.listing)
+            if of_component
             else "the component has none"
         )
         settable_kinds = (

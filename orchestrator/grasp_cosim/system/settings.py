@@ -2,11 +2,11 @@
 since the system was read are among them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from .parts import Acceptance, Component, Realtime
+from .parts import Acceptance, Component, Event, Realtime
 from .scenario import event_entry, fault_entry, limit_entry, trigger_entry
 from .stimuli import input_entry
 from .structure import Structure
@@ -16,6 +16,13 @@ from .times import in_seconds
 def run_settings(system: Structure) -> dict[str, Any]:
     """The settings of a run: those of its system, and what of these is not as it was read."""
     return {**settings(system), "changed": changed(system)}
+
+
+def with_events(settings: Mapping[str, Any], events: Sequence[Event]) -> Mapping[str, Any]:
+    """The settings of a run with events in addition, which come last."""
+    if not events:
+        return settings
+    return {**settings, "events": [*settings["events"], *map(event_entry, events)]}
 
 
 def settings(system: Structure) -> dict[str, Any]:
@@ -50,6 +57,8 @@ def settings(system: Structure) -> dict[str, Any]:
         entries["acceptance"] = _acceptance(system.verdict)
     if system.realtime != Realtime():
         entries["realtime"] = asdict(system.realtime)
+    if system.steered:
+        entries["steered"] = True
     if system.input:
         entries["input"] = input_entry(system.input)
     return entries

@@ -267,16 +267,20 @@ function connectScene() {
 
 // What draws a grasp at the time of the cursor, and plays it.
 function sceneOf(plan, series) {
-  const grasp = new Picture(recording, plan, new Map(series.map((one) => [one.name, one])));
-  find("scrub").min = recording.first;
-  find("scrub").max = recording.last;
+  let grasp;
+  const renew = (plan, series) => {
+    grasp = new Picture(recording, plan, new Map(series.map((one) => [one.name, one])));
+    find("scrub").min = recording.first;
+    find("scrub").max = recording.last;
+  };
+  renew(plan, series);
   const draw = () => {
     grasp.draw(cursor, chosenSpeed() || SLOW);
     find("scrub").value = cursor;
     find("clock").textContent = clock(cursor);
     find("pace").textContent = chosenSpeed() ? "" : `${speed()} × real time`;
   };
-  return { draw, toggle: () => play(!playing) };
+  return { draw, renew, toggle: () => play(!playing) };
 }
 
 async function startScene(plan) {

@@ -122,3 +122,5 @@ class Recording {
     return this.loaded.get(name);
   }
 }
+
+let Source = Recording; // what the signals come from; those of a run that goes on, from elsewhere

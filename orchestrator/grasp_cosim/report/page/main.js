@@ -1,7 +1,7 @@
 // The page at work: which signals, what time, what zoom; all of it in the address after the #.
 "use strict";
 
-const recording = new Recording(page);
+const recording = new Source(page);
 const MOST = 6; // lines of a panel
 let chosen = [...page.shown], asked = 0;
 
@@ -124,7 +124,7 @@ async function begin() {
   view = whole();
   if (page.scene) scene = await startScene(page.scene);
   connect();
-  find("signals").open = innerWidth > 760;
+  find("signals").open = innerWidth > beside;
   await recall();
   draw();
   state.ready = "yes";

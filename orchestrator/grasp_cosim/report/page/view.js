@@ -5,6 +5,7 @@ const page = JSON.parse(document.getElementById("page").textContent);
 const state = document.documentElement.dataset;
 const find = (id) => document.getElementById(id);
 
+let beside = 760; // px of a window from which the signals stand next to the traces
 let view = null, cursor = 0, hover = null, panels = [], scene = null, due = 0;
 
 const clamp = (v, low, high) => Math.min(Math.max(v, low), high);
