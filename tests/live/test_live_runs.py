@@ -29,6 +29,12 @@ def frames_until(frames, holds):
     return taken
 
 
+def time_of(answered):
+    """The time in s at which a request was done, from its line of the log."""
+    _, answer = answered
+    return float(answer["line"].split()[2])
+
+
 @engines
 @pytest.mark.parametrize("native", [False, True])
 def test_a_change_is_in_the_log_and_in_run_json_which_repeats_the_run(
@@ -41,7 +47,7 @@ def test_a_change_is_in_the_log_and_in_run_json_which_repeats_the_run(
             frames_until(frames, lambda frame: frame["time"] >= 0.2)
             answers = [ask(page.address, NAME, 0.5), ask(page.address, "sensor_1.gain", 3e-3)]
             later = frames_until(frames, lambda frame: len(frame["lines"]) > 0)
-            frames_until(frames, lambda frame: frame["time"] >= later[-1]["time"] + 0.2)
+            frames_until(frames, lambda frame: frame["time"] > time_of(answers[1]) + 0.1)
         return answers, later[-1]
 
     result, (answers, frame) = followed(system, act, engine=engine, realtime=Realtime(factor=2.0))
@@ -203,10 +209,17 @@ def test_inputs_without_a_source_are_set_and_recorded_too(fmus, tmp_path):
         },
         experiment={"step": 1e-3, "stop": 1.0},
     )
-    result, (status, answer) = followed(
-        system, lambda page: ask(page.address, "plant.force[1]", -1)
-    )
+
+    def act(page):
+        with following(page.address) as frames:
+            answered = ask(page.address, INPUT, -1)
+            frames_until(frames, lambda frame: frame["time"] > time_of(answered) + 0.01)
+        return answered, request(page.address)
+
+    result, ((status, answer), (_, html)) = followed(system, act)
     assert (status, answer["value"]) == (200, -1.0)
+    assert b'id="plots"' in html
+    assert b'id="scene"' not in html  # it has no group of metrics, and so no view
     assert set(result[INPUT]) == {0.0, -1.0}
     result.save(tmp_path / "run")
     again = simulate(System.load(tmp_path / "run" / "run.json"), stop=float(result.time[-1]))
@@ -241,8 +254,7 @@ def test_the_command_prints_the_address_and_ctrl_c_ends_it(tmp_path):
             address = next(line.split()[1] for line in process.stderr if line[:6] == "live: ")
             status, answer = ask(address, NAME, 0.5)
             with following(address) as frames:
-                changed_at = next(frames)["time"]
-                frames_until(frames, lambda frame: frame["time"] > changed_at + 0.1)
+                frames_until(frames, lambda frame: frame["time"] > time_of((status, answer)) + 0.1)
                 process.send_signal(signal.SIGINT)
                 last = [*frames][-1]
             process.wait(WITHIN)

@@ -87,7 +87,7 @@ class RunFolder:
             self._to_si = dict(of.to_si)
         else:
             if of.input and of.input.path:
-                self._origin["input_path"] = _path_from(self._place, of.input.path)
+                self._origin["input_path"] = _path_from(self._place, Path(of.input.path))
             conversions = in_si(of, ()).conversions
             self._to_si = {name: c for name, c in conversions.items() if name in of.recorded_names}
         self._form = form

@@ -15,7 +15,7 @@ first of the annotations there. Both let all components take a step at once.
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -99,6 +99,8 @@ class Extras:
 def extras_of(system: System) -> Extras:
     """The extras of a system."""
     shared = {f.name: getattr(system, f.name) for f in fields(Extras)}
+    if system.input:
+        shared["input"] = replace(system.input, path=None)  # the samples are in the archive
     beside = {
         c.name: Beside(dict(c.rename), c.step_ns, c.isolation, dict(c.units), c.solver, c.logging)
         for c in system.components

@@ -107,7 +107,7 @@ class Stimuli:
     recorded: tuple[Connection, ...] | None = field(default=None, compare=False)
     """Of a file that a run has recorded, the connections of that: see replay.py."""
     recorded_columns: Mapping[Port, Stimulus] = field(default_factory=dict, compare=False)
-    path: Path | None = field(default=None, compare=False)
+    path: str | None = field(default=None, compare=False)
     """Of the file, absolute; None where it is in an archive."""
 
     def __repr__(self) -> str:
@@ -180,7 +180,7 @@ def read_stimuli(
         is_text_file=time.is_text_file,
         recorded=recorded,
         recorded_columns=columns if recorded is not None else {},
-        path=path.absolute(),
+        path=str(path.absolute()),
     )
 
 
