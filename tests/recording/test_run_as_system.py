@@ -38,7 +38,10 @@ def test_a_trigger_and_limits_of_metrics_are_in_it(grasp, tmp_path):
     system = grasp.with_experiment(step=1e-2, stop=2.5)
     system = system.with_record(trigger="plant.contact[1] == true", before=0.05, after=0.1)
     system = system.with_settings(
-        {"verdict.metrics.time_difference.high": 0.05, "verdict.metrics.peak_contact_force[1].low": 1}
+        {
+            "verdict.metrics.time_difference.high": 0.05,
+            "verdict.metrics.peak_contact_force[1].low": 1,
+        }
     )
     result = simulate(system)
     result.save(tmp_path / "run")
