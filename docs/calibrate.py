@@ -48,7 +48,7 @@ class Rows(DaqOnlinePolicy):
     """Keeps the rows that come: the time in us, then a value for each signal."""
 
     def initialize(self) -> None:
-        """Begin without rows; pyXCP has put the signals into an order of its own."""
+        """Begin without rows; pyXCP has its own order of the signals."""
         self.rows: list[list[float]] = []
         self.names = [name for name, _ in self.daq_lists[0].headers]
 

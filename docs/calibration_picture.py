@@ -26,7 +26,7 @@ LABELS = {
 
 
 def session(folder: Path, ports: Mapping[str, str] = PORTS, more: Sequence[str] = ()) -> str:
-    """Run the commands of the page in a folder; return what the tool says once it measures.
+    """Run the commands of the page in a folder; return the output of the tool while it measures.
 
     folder has docs and fmus of a checkout. The run of the loop, whose verdict may fail where steps
     are late, gets `more` options. CalledProcessError where another command fails.

@@ -94,9 +94,9 @@ PAGE_WORDING: dict[str, re.Pattern[str]] = {
 
 EVERYDAY = frozenset(
     [
-        "API", "ARM", "ARM64", "ASCII", "C99", "CPU", "CSV", "END", "GB", "HTML", "HTTP", "II",
-        "IV", "JSON", "LED", "MB", "MIT", "OK", "PI", "README", "ROS", "SHA256", "SI", "TODO",
-        "TOML", "UDP", "URL", "USB", "UTF", "XML",
+        "API", "ARM", "ARM64", "ASCII", "C99", "CPU", "CSV", "END", "ETAS", "GB", "HTML",
+        "HTTP", "II", "INCA", "IP", "IV", "JSON", "LED", "MATLAB", "MB", "MIT", "OK", "PI",
+        "README", "ROS", "SHA256", "SI", "TODO", "TOML", "UDP", "URL", "USB", "UTF", "XML",
     ]
 )  # fmt: skip
 """Abbreviations that every reader of these pages knows, and names that look like one."""
