@@ -95,7 +95,7 @@ def test_in_real_time(short):
         ("when = 'plant.gap[1] < 1'\nthen = 'stop'", "then = 'stop': must be one of abort, warn"),
         ("when = 'plant.gap[1] ~ 1'", "when = 'plant.gap[1] ~ 1': must be like"),
         ("when = 'plant.gap[9] < 1'", "plant has no number 'gap[9]'"),
-        ("when = 'plant.contact[1] < 1'", "plant.contact[1] is Boolean; must be compared with"),
+        ("when = 'plant.contact[1] < 2'", "plant.contact[1] is Boolean; must be compared with"),
         ("when = 'plant.gap[1] < 1'\nset = 1", "unknown entry 'set'"),
     ],
 )
