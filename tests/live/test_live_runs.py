@@ -12,6 +12,7 @@ from grasp_cosim.hil.served import Service
 from grasp_cosim.live import live_page
 from grasp_cosim.live.live_page import LivePage
 from grasp_cosim.live.panel import panel_html, settings_of
+from grasp_cosim.system.parts import Condition, Event, Limit, Port
 from live.clients import WITHIN, ask, followed, following, history, request
 from support.marks import engines
 from support.proxies import ANY_PORT, build_proxy, serving
@@ -66,6 +67,26 @@ def test_a_change_is_in_the_log_and_in_run_json_which_repeats_the_run(
     plain = simulate(system, stop=until)
     differs = plain.time[plain["sensor_2.intensity"] != result["sensor_2.intensity"]]
     assert differs[0] == pytest.approx(changed["at"] + 1e-3, abs=1e-9)
+
+
+def test_what_happens_in_the_run_is_told_while_it_goes_on(grasp):
+    """An event of the system, and a limit that is exceeded."""
+    event = Event({Port("sensor_1", "reflectance"): 0.9}, at_ns=10**8)
+    limit = Limit(Condition(Port("plant", "gap[1]"), "<", 0.03), "warn")
+    system = replace(grasp.with_experiment(step=1e-3), events=(event,), limits=(limit,))
+
+    def act(page):
+        with following(page.address) as frames:
+            lines = []
+            for frame in frames:
+                lines += frame["lines"]
+                if any("limits[0]" in line for line in lines):
+                    return lines, frame["state"]
+
+    result, (lines, state) = followed(system, act, realtime=Realtime(factor=2.0))
+    assert state == "running"
+    assert "t = 0.1 s: sensor_1.reflectance = 0.9" in lines
+    assert all(line in result.log for line in lines)
 
 
 def test_a_value_that_does_not_fit_is_refused_and_the_old_one_stays(grasp):

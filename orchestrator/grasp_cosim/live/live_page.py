@@ -143,6 +143,8 @@ class LivePage:
         """Work out the figures of the links, and what the scene knows."""
         if links:
             self._links = links_so_far(self.feed)
+            for line in self.requests.happened():
+                self.note(line)
         if scene and self._has_scene is not False:
             new = scene_so_far(self.system, self.feed)
             self._has_scene = new is not None

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -67,6 +67,8 @@ class Requests:
         self._open: set[Request] = set()
         self._lock = threading.Lock()
         self._closed = False
+        self.happened: Callable[[], Sequence[str]] = tuple
+        """The lines of the log on what has happened in the run so far; for any thread."""
         self.meter: Meter | None = None
         """The timing of the run, once it goes on in real time."""
 

@@ -64,14 +64,16 @@ class RunLog:
         """The lines that are known before the first step."""
         return (*self._remarks, *self._record.unit_notes, *master.log)
 
+    def happened(self, master: Master) -> tuple[str, ...]:
+        """The lines on what has happened until now; any thread may ask for them."""
+        return (*self._record.dispatcher.log, *master.scenario.log, *master.watches.log)
+
     def lines(self, master: Master, is_over: bool) -> tuple[str, ...]:
         """All lines until now. A run that is over also names what was still to happen in it."""
         pending = [*master.scenario.pending(), *self._record.trigger_log()] if is_over else []
         return (
             *self._at_start(master),
-            *self._record.dispatcher.log,
-            *master.scenario.log,
-            *master.watches.log,
+            *self.happened(master),
             *master.warnings(),
             *_rejections(master),
             *master.end.requests,

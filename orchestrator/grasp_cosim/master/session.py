@@ -204,6 +204,8 @@ class Session:
         )
         master = self.master
         self._record.begin(master.slots, master.texts, master.bounds, listeners)
+        if requests is not None:
+            requests.happened = partial(self._log.happened, master)
         if self.pacer:
             self.pacer.spare = self._record.dispatcher.spare
         self._stack.callback(self._hand_over)  # before the FMUs are ended, and after:
