@@ -81,7 +81,8 @@ def test_what_happens_in_the_run_is_told_while_it_goes_on(grasp):
             for frame in frames:
                 lines += frame["lines"]
                 if any("limits[0]" in line for line in lines):
-                    return lines, frame["state"]
+                    break
+        return lines, frame["state"]
 
     result, (lines, state) = followed(system, act, realtime=Realtime(factor=2.0))
     assert state == "running"

@@ -49,6 +49,10 @@ def test_a_trigger_and_limits_of_metrics_are_in_it(grasp, tmp_path):
     assert again.verdict == result.verdict
     assert len(again.verdict) == 3
     [window], [found] = result.windows, again.windows
+    load_run(tmp_path / "run").save(tmp_path / "copy")
+    for folder in ("run", "copy"):
+        of_window = System.load(tmp_path / folder / window.subfolder / "run.json")
+        assert same_bits(window, simulate(of_window).windows[0])
     assert window.time.tolist() == found.time.tolist()
     assert same_bits(window, found)
 

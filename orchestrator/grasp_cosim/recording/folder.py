@@ -83,7 +83,7 @@ class RunFolder:
         self._place = folder.absolute()  # an FMU may go elsewhere
         self._origin = origin(of.components, command, self._place)
         if isinstance(of, RecordedRun):
-            self._origin |= _from(of, self._place)
+            self._origin |= _moved(of.origin, of.folder, self._place)
             self._to_si = dict(of.to_si)
         else:
             if of.input and of.input.path:
@@ -192,7 +192,7 @@ class RunFolder:
                 self._write_settings(part, place)
 
     def _write_settings(self, result: RecordedRun, window: str = "") -> None:
-        origin = dict(self._origin)
+        origin = _moved(self._origin, self._place, self._place / window)
         if result.components:
             origin["fmus"] = fmus_of(result.components, self._place / window)
         replace(result, origin=origin).to_json(self._place / window / SETTINGS)
@@ -354,23 +354,16 @@ def _groups(settings: Path) -> Sequence[str]:
     return names("groups") if older is None else older.get("metrics", [])
 
 
-def _from(run: RecordedRun, folder: Path) -> dict[str, Any]:
-    """The origin of a run, its paths from another folder where they are from its own."""
-    origin = dict(run.origin)
-    if run.folder is None:
-        return origin
+def _moved(origin: Mapping[str, Any], old: Path | None, new: Path) -> dict[str, Any]:
+    """The origin of a run, its paths from a new folder where they are from the old one."""
+    if old is None or old == new:
+        return dict(origin)
 
-    def moved(path: str) -> str:
-        return _path_from(folder, Path(run.folder or "", path))
+    def moved(entry: Mapping[str, Any], key: str) -> dict[str, Any]:
+        return {**entry, key: _path_from(new, old / entry[key])} if key in entry else dict(entry)
 
-    if "fmus" in origin:
-        origin["fmus"] = {
-            name: {**fmu, "path": moved(fmu["path"])} if "path" in fmu else fmu
-            for name, fmu in origin["fmus"].items()
-        }
-    if "input_path" in origin:
-        origin["input_path"] = moved(origin["input_path"])
-    return origin
+    fmus = {name: moved(fmu, "path") for name, fmu in origin.get("fmus", {}).items()}
+    return moved(origin, "input_path") | ({"fmus": fmus} if fmus else {})
 
 
 def now() -> datetime:
