@@ -43,13 +43,13 @@ def test_the_commands_on_blocks(own):
 def test_the_commands_on_native_fmus(own):
     """But for other platforms, which test_targets.py builds for."""
     here = [command for command in commands(NATIVE) if "--target" not in command]
-    assert len(here) == 3
+    assert len(here) == 4
     for command in here:
         assert cli.main(shlex.split(command)) == 0, command
     assert (own / "fmus/native/GripperPlant.fmu").is_file()
     assert (own / "fmus/native/MyPlant.fmu").is_file()
     files = {path.name for path in (own / "controller_c").iterdir()}
-    assert {"GraspController.h", "GraspController.c", "main.c"} <= files
+    assert {"GraspController.h", "GraspController.c", "main.c", "GraspController.a2l"} <= files
 
 
 def test_the_declarations():
