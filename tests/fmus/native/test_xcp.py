@@ -254,19 +254,19 @@ def test_every_step_is_measured_once_and_to_the_bit(written):
     block, fields = model.block, declared(model.block)
     p = build_params(block, fields, [start for f in fields for start in f.starts])
     force, target = OUTPUTS, OUTPUTS + 16
-    with slave(written("GraspController"), "GraspController", "0.002") as master:
+    with slave(written("GraspController"), "GraspController", "0.01") as master:
         master.measure([[(force, 8)], [(target, 8), (GAIN, 8)]], [[(force, 24)]])
-        master.wait_for(3 * 200)
+        master.wait_for(3 * 60)
         master(0xDD, 0)
         stamps = [struct.unpack_from("<I", m, 1)[0] for m in master.measured if m[0] == 0]
         firsts = [struct.unpack("<d", m[5:]) for m in master.measured if m[0] == 0]
         seconds = [struct.unpack("<dd", m[1:]) for m in master.measured if m[0] == 1]
         thirds = [struct.unpack("<ddd", m[5:]) for m in master.measured if m[0] == 2]
     assert master.missing == 0
-    assert {b - a for a, b in pairwise(stamps)} == {2000}
-    steps = islice(outputs_of(block, p, 0.002), stamps[-1] // 2000 + 1)
+    assert {b - a for a, b in pairwise(stamps)} == {10000}
+    steps = islice(outputs_of(block, p, 0.01), stamps[-1] // 10000 + 1)
     rows = [tuple(y[:3]) for y in steps]
-    expected = [rows[stamp // 2000] for stamp in stamps]
+    expected = [rows[stamp // 10000] for stamp in stamps]
     assert firsts == [row[:1] for row in expected]
     assert seconds == [(row[2], 3.0) for row in expected]
     assert thirds == expected
