@@ -59,7 +59,7 @@ def test_pya2l_finds_what_is_declared(a2l, model):
     declared = {v.name: v for v in model.description.variables}
     parameters = {c["Name"]["Value"]: c for c in module["CHARACTERISTIC"]}
     measured = {m["Name"]["Value"]: m for m in module["MEASUREMENT"]}
-    assert measured.pop("state")
+    assert measured.pop("state.numbers")
     assert {*parameters} == {n for n, v in declared.items() if v.causality == "parameter"}
     assert {*measured} == {n for n, v in declared.items() if v.causality != "parameter"}
     for name, entry in (parameters | measured).items():

@@ -12,6 +12,7 @@ import pytest
 from grasp_cosim.fmu_export.contract import build_params, declared
 from grasp_cosim.fmu_export.native.a2l import ADDRESS, EPK_ADDRESS
 from grasp_cosim.fmu_export.native.c_only import write_c
+from grasp_cosim.fmu_export.own_block import own_model
 from grasp_cosim.fmu_export.package import shipped_model
 from support.compiled import compile_c
 from support.kinds import TRANSLATED
@@ -77,6 +78,71 @@ def variables_of(a2l):
     ):
         found[name] = int(address, 16), FORMATS[kind]
     return found
+
+
+SWITCH = """\
+'A switch, whose structs begin with what is small.'
+
+from typing import Annotated, NamedTuple
+from dataclasses import dataclass
+
+from block_variables import Input, Output, Parameter, check
+
+
+@dataclass(frozen=True, slots=True)
+class Params:
+    enabled: Annotated[bool, Parameter("it switches", tunable=True)] = True
+
+    def __post_init__(self):
+        check(self)
+
+
+class Inputs(NamedTuple):
+    on: Annotated[bool, Input("it is on")] = True
+    level: Annotated[float, Input("what it switches", unit="V", nominal=1.0)] = 2.5
+
+
+class State(NamedTuple):
+    level: float
+
+
+class Outputs(NamedTuple):
+    is_on: Annotated[bool, Output("it is on", depends_on={"on"})]
+    state: Annotated[float, Output("what comes", unit="V", nominal=1.0, depends_on=set())]
+
+
+def initial_state(p, u):
+    return State(u.level)
+
+
+def step(p, x, u, h):
+    return State(x.level + h)
+
+
+def outputs(p, x, u):
+    return Outputs(p.enabled and u.on, x.level)
+"""
+
+
+def test_structs_that_begin_with_what_is_small(tmp_path):
+    """The compiler leaves room between them; an output may be called as the state is elsewhere."""
+    file = tmp_path / "switch.py"
+    file.write_text(SWITCH, "utf-8")
+    with own_model(file) as model:
+        write_c(tmp_path, model, a2l=True)
+    places = variables_of(tmp_path / "Switch.a2l")
+    expected = {"enabled": True, "on": True, "level": 2.5, "is_on": True}
+    with slave(tmp_path, "Switch") as master:
+        for name, value in expected.items():
+            address, form = places[name]
+            assert struct.unpack(form, master.read(address, struct.calcsize(form))) == (value,)
+        address, _ = places["state"]
+        [state] = struct.unpack("<d", master.read(address, 8))
+        assert 2.5 <= state < 1e3
+        master.write(places["enabled"][0], b"\0")
+        master.measure([[(places["is_on"][0], 1)]])
+        master.wait_for(2)
+        assert master.measured[-1][5:] == b"\0"
 
 
 def outputs_of(block, p, step):

@@ -24,6 +24,9 @@ MAX_CTO, MAX_DTO, STAMP_SIZE = 64, 248, 4
 ADDRESS, EPK_ADDRESS = 0x10000, 0xFFFF0000
 """Where the memory and the texts begin for a master."""
 
+STATE = "state.numbers"
+"""The name of the array of all that a block remembers."""
+
 IDENTIFIER = re.compile(r"(?!\d)\w+(\[\d+\])*(\.(?!\d)\w+(\[\d+\])*)*", re.ASCII)
 """What the standard takes for a name."""
 
@@ -65,18 +68,19 @@ def layout(groups: Sequence[Group], variables: Sequence[Variable], state_size: i
     offsets: dict[str, int] = {}
     at = 0
     for causality in _IN_MEMORY:
-        offsets[causality] = at
-        alignment = 1
-        for link, member in by_causality[causality].members:
+        members = by_causality[causality].members
+        alignment = max((_SIZES[link.kind] for link, _ in members), default=1)
+        offsets[causality] = at = _aligned(at, alignment)
+        for link, member in members:
             size = _SIZES[link.kind]
-            at, alignment = _aligned(at, size), max(alignment, size)
+            at = _aligned(at, size)
             name = link.name if IDENTIFIER.fullmatch(link.name) else member
             place = f"{causality}s.{member}"
             places.append(Place(by_name[link.name], name, link.kind, place, at))
             at += size
-        at = _aligned(at + (not by_causality[causality].members), alignment)
+        at = _aligned(at + (not members), alignment)  # C has a byte where there is nothing
     offsets["state"] = at = _aligned(at, 8)
-    _check_names([place.name for place in places])
+    _check_names([STATE, *(place.name for place in places)])
     return Layout(places, offsets, at + 8 * state_size)
 
 
@@ -219,7 +223,7 @@ def _measurement(name: str, p: Place) -> str:
 def _state(name: str, memory: Layout, size: int) -> str:
     low, high = _RANGES["Real"]
     return (
-        f'    /begin MEASUREMENT state "what the block remembers between steps"\n'
+        f'    /begin MEASUREMENT {STATE} "what the block remembers between steps"\n'
         f"      FLOAT64_IEEE no_unit 0 0 {low!r} {high!r}\n"
         f"      ECU_ADDRESS {ADDRESS + memory.offsets['state']:#x}\n"
         f"      MATRIX_DIM {size} 1 1\n"
@@ -238,7 +242,7 @@ def _groups(places: Sequence[Place]) -> Iterator[str]:
             layers.setdefault(layer if dot else "parameters", []).append(p.name)
         else:
             measured.setdefault(f"{p.variable.causality}s", []).append(p.name)
-    measured["states"] = ["state"]
+    measured["states"] = [STATE]
     for group, names in layers.items():
         yield _group(group, "CHARACTERISTIC", names)
     for group, names in measured.items():
