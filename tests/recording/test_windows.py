@@ -349,3 +349,33 @@ def test_without_space_the_run_goes_on_and_says_so(monkeypatch):
     assert result.log[-1].endswith(
         "No space left on device: the result has no rows; those of --out are whole"
     )
+
+
+class Steps:
+    """A listener that keeps the numbers of the steps that it gets."""
+
+    def __init__(self):
+        self.steps = []
+
+    def begin(self, experiment, signals):
+        pass
+
+    def block(self, steps, rows):
+        self.steps += steps.tolist()
+
+    def end(self, complete):
+        pass
+
+
+class AllSteps(Steps):
+    is_of_all_rows = True
+
+
+@pytest.mark.parametrize("every", [1, 5])
+def test_a_listener_may_get_the_rows_between_the_windows_too(grasp, every):
+    of_windows, of_all = Steps(), AllSteps()
+    system = contact(grasp, before=0.05, after=0.1)
+    result = simulate(system, every=every, listeners=[of_windows, of_all])
+    [window] = result.windows
+    assert of_windows.steps == np.rint(window.time / 1e-2).astype(int).tolist()
+    assert of_all.steps == [*range(0, 251, every)]
