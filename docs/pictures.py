@@ -9,7 +9,6 @@ Chromium, and timing.png a machine that is idle.
 import os
 import re
 import shutil
-import subprocess
 import sys
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -23,7 +22,7 @@ import calibration_picture
 import delicate_picture
 import numpy as np
 import tutorials
-from browser import Browser
+from browser import Browser, chromium
 from grasp_cosim import hand_system, simulate, tandem_system
 from grasp_cosim.base.files import write_text
 from grasp_cosim.grasp.presets import with_case
@@ -96,27 +95,26 @@ def draw_three_layers(folder: Path) -> None:
     write_text(folder / "three_layers.svg", three_layers_svg())
 
 
+def _browser(width: int, height: int) -> Browser:
+    """A window for the picture of a page."""
+    if chromium() is None:
+        raise SystemExit("chromium is not installed; it takes the pictures of pages")
+    return Browser(width, height)
+
+
 def draw_report(folder: Path) -> None:
     """report.png, the page of a run at the second contact, as Chromium shows it."""
-    browser = shutil.which("chromium") or shutil.which("chromium-browser")
-    if browser is None:
-        raise SystemExit("chromium is not installed; it takes the picture of the page, report.png")
-    with TemporaryDirectory(ignore_cleanup_errors=True) as kept:
+    with TemporaryDirectory() as kept:
         page = Path(kept, "grasp/report.html")
         tutorials.done("run", "--native", "--out", str(page.parent))
         tutorials.done("report", str(page.parent))
         run = load_run(page.parent)
         times: Any = run.metrics["time_to_contact"]
         touches = run.time.searchsorted(max(times))
-        subprocess.run(  # noqa: S603 - the browser of this machine, our own page
-            [
-                browser, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars",
-                f"--user-data-dir={kept}/profile", "--virtual-time-budget=5000",
-                "--window-size=1280,1560", f"--screenshot={folder.resolve() / 'report.png'}",
-                f"{page.as_uri()}#at={run.time[touches]}",
-            ],
-            check=True, capture_output=True, timeout=120,
-        )  # fmt: skip
+        with _browser(1280, 1560) as browser:
+            browser.open(f"{page.as_uri()}#at={run.time[touches]}")
+            browser.wait_for("document.documentElement.dataset.ready")
+            browser.screenshot(folder / "report.png")
 
 
 def draw_live(folder: Path) -> None:
@@ -125,7 +123,7 @@ def draw_live(folder: Path) -> None:
 
     def look(address: str) -> None:
         try:
-            with Browser(1400, 1300) as browser:
+            with _browser(1400, 1300) as browser:
                 browser.open(address)
                 browser.wait_for("document.documentElement.dataset.ready && recording.last > 5")
                 browser.evaluate(

@@ -14,21 +14,12 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..interface.units import IDENTITY
-from ..system.connectors import read_at
+from ..system.conditions import COMPARE, compared
 from ..system.description import System
 from ..system.parts import Port
 from ..system.record import Trigger
 from ..system.times import in_seconds, seconds
 from .listener import Floats, Steps, Window
-
-_COMPARE: Mapping[str, Callable[..., Any]] = {
-    "<": np.less,
-    "<=": np.less_equal,
-    ">": np.greater,
-    ">=": np.greater_equal,
-    "==": np.equal,
-    "!=": np.not_equal,
-}
 
 
 def check_every(system: System, every: int) -> None:
@@ -66,9 +57,8 @@ class TriggeredRows:
         self._system, self._condition = system, trigger.when
         self._before = int(trigger.before_ns // system.step_ns)
         self._after = int(trigger.after_ns // system.step_ns)
-        port, self._change = read_at(system, trigger.when.port)
-        self._place, self._compare = slots[port], _COMPARE[trigger.when.relation]
-        self._constant = self._number(port)
+        port, self._change, self._constant = compared(system, trigger.when)
+        self._place, self._compare = slots[port], COMPARE[trigger.when.relation]
         self._held = False
         self._kept: deque[tuple[Steps, Floats]] = deque()
         """Rows that come into the next window, if that is near."""
@@ -77,14 +67,6 @@ class TriggeredRows:
         self._end = -1
         self._number_of_windows = 0
         self._lines: tuple[str, ...] = ()
-
-    def _number(self, port: Port) -> float:
-        """The number that the signal is compared with; that of an item, where it is one."""
-        value = self._condition.value
-        if not isinstance(value, str):
-            return float(value)
-        interface = self._system.component(port.component, str(port)).interface
-        return interface.by_name[port.variable].items[value]
 
     @property
     def is_open(self) -> bool:

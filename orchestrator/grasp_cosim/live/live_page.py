@@ -6,6 +6,7 @@ import base64
 import json
 import struct
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from types import TracebackType
 from typing import Any, Self
@@ -177,7 +178,6 @@ class LivePage:
         if not (self.feed.begun.wait(START_WITHIN) and self.feed.has_rows):
             return
         number, lines, scene, is_last = self.feed.pairs.count, 0, 0, False
-        sleeper = threading.Event()
         while not is_last and goes_on():
             with self.feed.changed:
                 if not self.feed.ended and self.feed.pairs.count == number:
@@ -200,7 +200,7 @@ class LivePage:
                     frame["scene"] = {"state": self._scene.state, "marks": self._scene.marks}
             yield json.dumps(frame)
             if not is_last:
-                sleeper.wait(FRAME)
+                time.sleep(FRAME)
 
     def _status(self) -> dict[str, Any]:
         """How the run goes, for a frame."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import operator
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -21,7 +20,7 @@ from ..interface.fmi_types import Value
 from ..interface.units import IDENTITY
 from ..interface.values import Given
 from ..interface.variables import Variable
-from ..system.connectors import read_at
+from ..system.conditions import COMPARE, compared, number_of
 from ..system.description import System
 from ..system.names import main_port
 from ..system.parts import Condition, Event, Port, literal
@@ -32,16 +31,6 @@ from .exchanged import exchanged, sourced
 from .fault_windows import NO_CUTS, Cut, Window, fault_functions
 from .occurrence import Occurrence
 from .requests import Answer, Request, Requests
-
-_COMPARE: Mapping[str, Callable[[float, float], bool]] = {
-    "<": operator.lt,
-    "<=": operator.le,
-    ">": operator.gt,
-    ">=": operator.ge,
-    "==": operator.eq,
-    "!=": operator.ne,
-}
-
 
 LARGEST = sys.float_info.max
 
@@ -116,7 +105,8 @@ class Scenario:
             self._add_event(f"events[{i}]", event)
         windows = []
         for i, fault in enumerate(system.faults):
-            parameters = {n: self._number(fault.target, v) for n, v in fault.parameters.items()}
+            given = fault.parameters.items()
+            parameters = {n: number_of(system, fault.target, v) for n, v in given}
             in_numbers = replace(fault, parameters=parameters)
             windows.append(Window(in_numbers, system.step_ns, system.start_ns))
             self._pending += windows[-1].occurrences(f"faults[{i}]")
@@ -322,17 +312,11 @@ class Scenario:
     def _holds(self, condition: Condition | None) -> bool:
         if condition is None:
             return True
-        port, change = read_at(self._system, condition.port)
+        port, change, constant = compared(self._system, condition)
         value = float(self._values[self._slots[port]])
         if change != IDENTITY:
             value = change(value)
-        return _COMPARE[condition.relation](value, self._number(port, condition.value))
-
-    def _number(self, port: Port, value: Value) -> float:
-        """The number of a constant for a port, which may be the name of an item."""
-        if not isinstance(value, str):
-            return value
-        return self._instances[port.component].interface.by_name[port.variable].items[value]
+        return bool(COMPARE[condition.relation](value, constant))
 
     def _setter(self, place: str, event: Event) -> Callable[[int], Sequence[str]]:
         """What an event does.

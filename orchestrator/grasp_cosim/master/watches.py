@@ -12,7 +12,7 @@ import numpy.typing as npt
 from ..interface.interface import Interface
 from ..recording.proxies import BACK
 from ..recording.recorded_run import Trip
-from ..system.connectors import read_at
+from ..system.conditions import compared
 from ..system.description import System
 from ..system.parts import RELATIONS, Limit, Port
 from ..system.times import in_seconds, seconds
@@ -42,10 +42,8 @@ class Watches:
         rows: list[Sequence[float]] = []
         self.entries: list[Watch] = []
         for number, limit in enumerate(system.limits):
-            port, change = read_at(system, limit.when.port)
+            port, change, constant = compared(system, limit.when)
             variable = interfaces[port.component].by_name[port.variable]
-            value = limit.when.value
-            constant = variable.items[value] if isinstance(value, str) else float(value)
             relation = RELATIONS.index(limit.when.relation)
             rows.append((slots[port], relation, constant, change.factor, change.offset, 1.0, 0.0))
             unit = variable.unit if port == limit.when.port else None

@@ -142,8 +142,7 @@ def _stimuli(path: Path, run: RunJson) -> Stimuli | None:
 
 def _candidates(path: Path, recorded: str | None, name: str) -> Iterator[Path]:
     """The files that there are of one that a run had: at its path then, and next to run.json."""
-    places = [path.parent / name] if recorded is None else [path.parent / recorded]
-    places.append(path.parent / name)
+    places = (path.parent / file for file in dict.fromkeys((recorded or name, name)))
     return (place for place in places if place.exists())
 
 

@@ -292,7 +292,11 @@ def _check_condition(system: Structure, condition: Condition | None, place: str)
         kind = system.once(taps)[str(port)].kind
     boolean = kind == "Boolean"
     is_word = isinstance(value, bool)
-    relations = {"Real": RELATIONS[:4]}.get(kind, RELATIONS[4:] if is_word else RELATIONS)
+    relations = RELATIONS
+    if kind == "Real":
+        relations = RELATIONS[:4]
+    elif boolean and is_word:
+        relations = RELATIONS[4:]
     if isinstance(value, str):
         known(f"{place}: {port} is {kind} and has no item", value, items)
     elif kind == "Integer" and float(value).is_integer():

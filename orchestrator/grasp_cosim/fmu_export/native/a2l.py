@@ -9,6 +9,7 @@ import re
 import sys
 from collections.abc import Iterator, Sequence
 from hashlib import sha256
+from pathlib import Path
 from typing import NamedTuple
 
 from ..contract import Enumeration, Variable
@@ -19,8 +20,7 @@ from .text import UntranslatableError, comment_text
 EVENT = "step"
 LOOPBACK, PORT = "127.0.0.1", 5555
 """Where the example listens: the UDP port that masters take by default."""
-MAX_CTO, MAX_DTO, STAMP_SIZE = 64, 248, 4
-"""Bytes of a command, of a message with values, of its time: as in c/xcp.h."""
+SLAVE = Path(__file__).with_name("c") / "xcp.h"
 ADDRESS, EPK_ADDRESS = 0x10000, 0xFFFF0000
 """Where the memory and the texts begin for a master."""
 
@@ -135,12 +135,13 @@ def a2l_texts(name: str, summary: str, memory: Layout) -> dict[str, str]:
     parameters = [p for p in memory.places if p.variable.causality == "parameter"]
     measured = [p for p in memory.places if p.variable.causality != "parameter"]
     state_size = (memory.size - memory.offsets["state"]) // 8
+    longest_entry = _size("XCP_MAX_DTO") - 1 - _size("XCP_STAMP_SIZE")  # behind number and time
     return {
         "summary": _quoted(summary),
         "epk_address": f"{EPK_ADDRESS:#x}",
-        "max_cto": str(MAX_CTO),
-        "max_dto": str(MAX_DTO),
-        "max_entry": str(MAX_DTO - 1 - STAMP_SIZE),
+        "max_cto": str(_size("XCP_MAX_CTO")),
+        "max_dto": str(_size("XCP_MAX_DTO")),
+        "max_entry": str(longest_entry),
         "event": EVENT,
         "port": str(PORT),
         "conversions": "\n".join(_conversions(memory.places)),
@@ -150,6 +151,13 @@ def a2l_texts(name: str, summary: str, memory: Layout) -> dict[str, str]:
         ),
         "groups": "\n".join(_groups(memory.places)),
     }
+
+
+def _size(name: str) -> int:
+    """A size in bytes that the slave has."""
+    found = re.search(rf"\b{name} = (\d+)", SLAVE.read_text("utf-8"))
+    assert found is not None  # noqa: S101 - of our own header
+    return int(found[1])
 
 
 def _conversions(places: Sequence[Place]) -> Iterator[str]:

@@ -66,19 +66,20 @@ def c_only(model: Model, a2l: bool = False) -> dict[str, bytes]:
     starts: dict[str, Value] = {v.name: v.start for v in variables if v.start is not None}
     descriptions = {v.name: v.description for v in variables}
     libm = called_of_libm(block)
+    state_size = _state_size(block)
     texts = {
         "name": name,
         "summary": comment_text(model.description.summary),
         "libm": ", ".join(libm) or "nothing",
         "structs": structs(groups, _MEANINGS, starts, descriptions),
-        "state_size": str(_state_size(block)),
+        "state_size": str(state_size),
         **_copying(*groups),
         **_example(name, libm, groups[-1]),
     }
     files = {"block.h": block}
     helpers, templates = [*HELPERS], {**_TEMPLATES}
     if a2l:
-        memory = layout(groups, variables, int(texts["state_size"]))
+        memory = layout(groups, variables, state_size)
         texts |= xcp_texts(name, memory) | a2l_texts(name, model.description.summary, memory)
         helpers += XCP_HELPERS
         templates |= _XCP_TEMPLATES
