@@ -38,6 +38,7 @@ from .validity import (
     check_steps,
     check_stimuli,
 )
+from .without import without
 
 LOGGER = logging.getLogger(__name__)
 """Gets what a system does without."""
@@ -289,6 +290,31 @@ class System(Structure):
             for name, value in (entries or {}).items():
                 overrides[f"{place}.{table}.{name}"] = value
         return self.with_overrides(as_overrides(overrides, f"swap {component}"))
+
+    def without(self, component: str) -> System:
+        """A copy without a component, whose place something outside takes: your code, or hardware.
+
+        The inputs that it was connected to keep their start values until they are set. What the
+        system says of it is left out, with a note on events, faults and limits.
+
+        Args:
+            component: The name of the component.
+
+        Returns:
+            The changed system.
+
+        Raises:
+            InputError: There is no such component, or no other one.
+
+        Example:
+            >>> from grasp_cosim import grasp_system, simulate
+            >>> with simulate.session(grasp_system().without("controller"), step=1e-3) as session:
+            ...     session.set("plant.force[1]", -0.1)
+            ...     more = session.step(10)
+            ...     session["plant.velocity[1]"] < 0.0
+            True
+        """
+        return replace(self, **without(self, component))
 
     def with_own_values(self, *names: str) -> System:
         """A copy in which components have the start values that their FMUs declare.

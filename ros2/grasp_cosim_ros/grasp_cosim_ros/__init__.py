@@ -1,0 +1,1 @@
+"""A ROS 2 node for any FMU, or for a system of FMUs without one component."""

@@ -1,0 +1,421 @@
+"""The lifecycle node: configure loads the model, activate begins the exchange, deactivate ends it
+safely. See README.md.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from grasp_cosim import InputError, SimulationError
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.time import Time
+from rosgraph_msgs.msg import Clock
+
+from .diagnostics import status
+from .exchange import Exchange, Phase
+from .messages import Encode, decoder, encoder
+from .model import Model
+from .parameters import ModelParameters, declare, settings_of
+from .settings import Settings
+from .topics import Topic, Topics, read_topics
+
+SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
+
+LOOK_INTERVAL = 0.05
+"""s between two looks whether the peers are there."""
+
+DIAGNOSTICS_INTERVAL = 1.0
+"""s."""
+
+INPUT_ERROR, SIMULATION_ERROR = 2, 3
+"""Exit codes, as those of the command grasp-cosim."""
+
+
+class Told(NamedTuple):
+    """A topic that is published: its publisher, and what makes its messages."""
+
+    topic: Topic
+    publisher: Any
+    encode: Encode
+
+
+class FmuNode(LifecycleNode):  # type: ignore[misc]
+    """A model as a node."""
+
+    def __init__(self) -> None:
+        super().__init__("grasp_cosim")
+        declare(self)
+        self.exit_code: int | None = None
+        """Set where the process is to end."""
+        self._autostart = bool(self.get_parameter("autostart").value)
+        self._exchange: Exchange | None = None
+        self._undo: list[Callable[[], None]] = []
+        """What deactivation takes back, in this order."""
+        self._ticker: Any = None
+        self._last_reason = ""
+        self._refusals: set[str] = set()
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self.create_timer(DIAGNOSTICS_INTERVAL, self._tell_status)
+
+    # Transitions ------------------------------------------------------------------------------
+
+    def on_configure(self, state: Any) -> TransitionCallbackReturn:
+        """Load the model, check the topics, declare the parameters."""
+        try:
+            self._configure()
+        except InputError as error:
+            self._fail(str(error), INPUT_ERROR)
+            return FAILURE
+        return SUCCESS
+
+    def _configure(self) -> None:
+        self._settings = settings = settings_of(self)
+        system = settings.model_system()
+        self._topics = read_topics(Path(settings.topics), system)
+        self._check(settings, self._topics)
+        recorded = bool(settings.out)
+        model = Model(system, settings.period or None, settings.stop or None, recorded)
+        try:
+            self._told = [self._publisher(topic, model) for topic in self._topics.publish]
+            self._decoders = {
+                topic.name: decoder(f"{settings.topics}: subscribe.{topic.name}", topic)
+                for topic in self._topics.subscribe
+            }
+            self._clock_publisher = (
+                self.create_publisher(Clock, "/clock", 10) if settings.publish_clock else None
+            )
+            self._parameters = ModelParameters(self, model, self._topics.inputs)
+        except BaseException:
+            model.close()
+            raise
+        self._model = model
+
+    def _check(self, settings: Settings, topics: Topics) -> None:
+        """InputError where settings and topics do not fit each other."""
+        if settings.in_lockstep and not topics.subscribe:
+            raise InputError(
+                f"{settings.topics}: subscribe is empty: lockstep has nothing to wait for; must "
+                "have a topic, or mode = clock"
+            )
+        if settings.on_loss == "failsafe" and topics.subscribe and not topics.failsafe:
+            raise InputError(
+                f"{settings.topics}: failsafe is empty; must have a safe value of a variable, as "
+                "on_loss = failsafe"
+            )
+
+    def _publisher(self, topic: Topic, model: Model) -> Told:
+        place = f"{self._settings.topics}: publish.{topic.name}"
+        cls, encode = encoder(place, topic, int(model.period_ns))
+        return Told(topic, self.create_lifecycle_publisher(cls, topic.name, _qos(topic)), encode)
+
+    def on_activate(self, state: Any) -> TransitionCallbackReturn:
+        """Begin to listen; the model begins with the first samples, or sends the first ones."""
+        super().on_activate(state)
+        settings = self._settings
+        self._refusals.clear()
+        self._last_reason = ""
+        self._exchange = Exchange(self._model, self._topics, settings, self._publish, self._lost)
+        for topic in self._topics.subscribe:
+            cls, decode = self._decoders[topic.name]
+            take = self._taker(topic.name, decode)
+            subscription = self.create_subscription(cls, topic.name, take, _qos(topic))
+            self._undo.append(partial(self.destroy_subscription, subscription))
+        self._deadline = self._timer(settings.timeout, self._on_deadline)
+        self._deadline.cancel()
+        if settings.initiate or not self._topics.subscribe:
+            self._looking = self._timer(LOOK_INTERVAL, self._look_for_peers)
+        return SUCCESS
+
+    def _timer(self, period: float, callback: Callable[[], None], clock: Any = None) -> Any:
+        """A timer that lives until deactivation."""
+        timer = self.create_timer(period, self._guarded(callback), clock=clock)
+        self._undo.append(partial(self.destroy_timer, timer))
+        return timer
+
+    def on_deactivate(self, state: Any) -> TransitionCallbackReturn:
+        """End the exchange, with safe outputs."""
+        self._end_exchange()
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: Any) -> TransitionCallbackReturn:
+        """Free the model."""
+        self._parameters.remove()
+        for told in self._told:
+            self.destroy_lifecycle_publisher(told.publisher)
+        if self._clock_publisher is not None:
+            self.destroy_publisher(self._clock_publisher)
+        self._model.close()
+        return SUCCESS
+
+    def on_shutdown(self, state: Any) -> TransitionCallbackReturn:
+        """End the exchange, with safe outputs, and free the model."""
+        self._end_exchange()
+        if state.label != "unconfigured":
+            self.on_cleanup(state)
+        self.exit_code = self.exit_code or 0
+        return SUCCESS
+
+    def _end_exchange(self) -> None:
+        """Publish the safe values, stop listening, and keep the result."""
+        if self._exchange is None:
+            return
+        exchange, self._exchange = self._exchange, None
+        while self._undo:
+            self._undo.pop()()
+        if self._model.is_begun:
+            values = exchange.failsafe()
+            for told in self._told:
+                if any(entry.name in self._topics.failsafe for entry in told.topic.entries):
+                    self._send(told, values)
+            self._model.end()
+            if self._settings.out:
+                self._model.session.result().save(self._settings.out)
+        count = exchange.samples.count
+        self.get_logger().info(
+            f"{count.steps} steps, {count.misses} missed, {count.late} samples late, "
+            f"{count.refused} refused, {count.losses} losses of the peers"
+        )
+
+    # The exchange -----------------------------------------------------------------------------
+
+    def _guarded(self, action: Callable[[], None]) -> Callable[[], None]:
+        """The action; a model that fails ends the exchange, in one line."""
+
+        def guarded() -> None:
+            try:
+                action()
+            except (InputError, SimulationError) as error:
+                self._fail(str(error), SIMULATION_ERROR)
+            if self._exchange and self._exchange.phase is Phase.ENDED:
+                self.get_logger().info("the stop time was reached")
+                self._stop(0)
+
+        return guarded
+
+    def _taker(self, name: str, decode: Callable[[Any], Mapping[str, float]]) -> Any:
+        """What takes the messages of a topic."""
+
+        def take(message: Any) -> None:
+            exchange = self._exchange
+            if exchange is None:
+                return
+            try:
+                values = decode(message)
+            except InputError as error:
+                exchange.samples.count.refused += 1
+                self._tell_once(f"{name}: {error}")
+                return
+            self._guarded(lambda: self._take(exchange, name, values))()
+
+        return take
+
+    def _take(self, exchange: Exchange, name: str, values: Mapping[str, float]) -> None:
+        began, steps = exchange.phase, exchange.samples.count.steps
+        exchange.take(name, values, self._now_ns())
+        if exchange.phase is Phase.RUNNING and began is not Phase.RUNNING:
+            self._run()
+        elif exchange.samples.count.steps != steps:
+            self._deadline.reset()
+
+    def _look_for_peers(self) -> None:
+        """Send the first sample once the peers are there to take it."""
+        absent = self._absent_peers()
+        if absent:
+            self._tell_once(f"waits for {', '.join(absent)}", severity="info")
+            return
+        self._looking.cancel()
+        if self._exchange and self._exchange.phase is Phase.WAITING:
+            self._exchange.start()
+            self._run(first=True)
+
+    def _absent_peers(self) -> list[str]:
+        if not self._settings.in_lockstep:
+            return []
+        listeners = [
+            f"a subscriber of {t.topic.name}"
+            for t in self._told
+            if not t.publisher.get_subscription_count()
+        ]
+        speakers = [
+            f"a publisher of {topic.name}"
+            for topic in self._topics.subscribe
+            if not self.count_publishers(topic.name)
+        ]
+        return listeners + speakers
+
+    def _run(self, first: bool = False) -> None:
+        """Have steps begin: by the clock, or by the samples, each with its deadline."""
+        if self._settings.in_lockstep:
+            if not first:  # the peer may take long to begin
+                self._deadline.reset()
+            return
+        self._tick_origin = self._now_ns()
+        self._ticks = 0
+        if self._ticker is None:
+            period = 1e-9 * int(self._model.period_ns)
+            self._ticker = self._timer(period, self._on_tick, self.get_clock())
+            self._undo.append(self._forget_ticker)
+
+    def _forget_ticker(self) -> None:
+        self._ticker = None
+
+    def _on_deadline(self) -> None:
+        if self._exchange:
+            self._exchange.step(self._now_ns())
+
+    def _on_tick(self) -> None:
+        """Do the steps that are due; a host that stood still does not make up for them."""
+        exchange, now = self._exchange, self._now_ns()
+        if exchange is None or exchange.phase is Phase.WAITING:
+            return
+        period = int(self._model.period_ns)
+        due = (now - self._tick_origin) // period - self._ticks
+        if due < 0:
+            self._loss_by_clock(f"the clock went back by {-due} periods")
+        elif due * period > 1e9 * self._settings.stall:
+            self._loss_by_clock(f"a step began {1e-9 * due * period:.3g} s late")
+        else:
+            for _ in range(due):
+                if exchange.phase not in (Phase.RUNNING, Phase.LOST) or self._exchange is None:
+                    return
+                exchange.step(now)
+            self._ticks += due
+
+    def _loss_by_clock(self, reason: str) -> None:
+        self._tick_origin, self._ticks = self._now_ns(), 0
+        if self._exchange and self._exchange.phase is Phase.RUNNING:
+            self._exchange.lose(reason)
+
+    def _now_ns(self) -> int:
+        return int(self.get_clock().now().nanoseconds)
+
+    def _publish(self, values: Mapping[str, float]) -> None:
+        if self._clock_publisher is not None:
+            self._clock_publisher.publish(Clock(clock=self._stamp()))
+        for told in self._told:
+            self._send(told, values)
+
+    def _send(self, told: Told, values: Mapping[str, float]) -> None:
+        message = told.encode(values)
+        if hasattr(message, "header") and not hasattr(message, "points"):  # that begins at once
+            message.header.stamp = self._stamp()
+        told.publisher.publish(message)
+
+    def _stamp(self) -> Any:
+        """The time of the model where it makes the time, else that of the node."""
+        if self._settings.publish_clock or self._settings.in_lockstep:
+            return Time(nanoseconds=int(self._model.time_ns)).to_msg()
+        return self.get_clock().now().to_msg()
+
+    # Losses and failures ----------------------------------------------------------------------
+
+    def _lost(self, reason: str) -> None:
+        self._last_reason = reason
+        on_loss = self._settings.on_loss
+        self.get_logger().error(f"the peers are lost: {reason}: {on_loss}")
+        if on_loss == "stop":
+            self._stop(SIMULATION_ERROR)
+        elif self._settings.in_lockstep:
+            self._deadline.cancel()
+            period = 1e-9 * int(self._model.period_ns)
+            self._alone = self._timer(period, self._on_alone)
+
+    def _on_alone(self) -> None:
+        """Go on without the peers, at the pace of the period, until they are back."""
+        if self._exchange and self._exchange.phase is Phase.LOST:
+            self._exchange.step(self._now_ns())
+        else:
+            self._alone.cancel()
+
+    def _fail(self, reason: str, exit_code: int) -> None:
+        self._last_reason = reason
+        self.get_logger().error(reason)
+        if self._exchange is not None:
+            self._stop(exit_code)
+        elif self._autostart:
+            self.exit_code = exit_code
+
+    def _stop(self, exit_code: int) -> None:
+        """Deactivate; a process of its own then ends."""
+        self.trigger_deactivate()
+        if self._autostart:
+            self.exit_code = exit_code
+
+    def _tell_once(self, line: str, severity: str = "error") -> None:
+        if line not in self._refusals and len(self._refusals) < 100:
+            self._refusals.add(line)
+            getattr(self.get_logger(), severity)(line)
+
+    def _tell_status(self) -> None:
+        """Publish the diagnostics, and look for peers that speak of something else."""
+        exchange = self._exchange
+        if exchange and exchange.phase is Phase.WAITING:
+            self._tell_other_types()
+        message = DiagnosticArray()
+        message.header.stamp = self.get_clock().now().to_msg()
+        message.status = [status(self.get_fully_qualified_name(), exchange, self._last_reason)]
+        self._diagnostics.publish(message)
+
+    def _tell_other_types(self) -> None:
+        """Say where a peer has another type on a topic: ROS does not connect them."""
+        for topic in self._topics.subscribe:
+            for peer in self.get_publishers_info_by_topic(self.resolve_topic_name(topic.name)):
+                if peer.topic_type != topic.type:
+                    self._last_reason = (
+                        f"{topic.name}: {peer.node_name} publishes {peer.topic_type}; must be "
+                        f"{topic.type}"
+                    )
+                    self._tell_once(self._last_reason)
+
+
+def _qos(topic: Topic) -> QoSProfile:
+    return QoSProfile(depth=topic.depth, reliability=ReliabilityPolicy[topic.reliability.upper()])
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the node until a signal, or with autostart until its run has ended.
+
+    Args:
+        arguments: Those of the command line.
+
+    Returns:
+        The exit code.
+    """
+    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    node = FmuNode()
+
+    def end(*_: object) -> None:
+        node.exit_code = node.exit_code or 0
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, end)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    if node.get_parameter("autostart").value and node.trigger_configure() is SUCCESS:
+        node.trigger_activate()
+    try:
+        while node.exit_code is None:
+            executor.spin_once(timeout_sec=0.1)
+    except ExternalShutdownException:
+        pass
+    node.trigger_shutdown()
+    for _ in range(10):  # what was published last leaves
+        executor.spin_once(timeout_sec=0.01)
+    executor.shutdown()
+    node.destroy_node()
+    rclpy.try_shutdown()
+    return node.exit_code or 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv))
