@@ -48,13 +48,13 @@ def without(system: Structure, name: str) -> dict[str, Any]:
                 staying.append(part)
         return tuple(staying)
 
-    faults = kept("faults", ((f, [f.target, *_of(f.when)]) for f in system.faults))
-    connected = {c.target for c in system.connections} - freed
+    sources = {c.target: c.source for c in system.connections}
+    faults = ((f, [f.target, sources[f.target], *_of(f.when)]) for f in system.faults)
     return {
         "components": tuple(_started(component, freed) for component in components),
         "connections": connections,
         "events": kept("events", ((e, _ports_of(e)) for e in system.events)),
-        "faults": tuple(fault for fault in faults if fault.target in connected),
+        "faults": kept("faults", faults),
         "limits": kept("limits", ((limit, [limit.when.port]) for limit in system.limits)),
         "roles": {role: c for role, c in system.roles.items() if c != name},
         "presets": {

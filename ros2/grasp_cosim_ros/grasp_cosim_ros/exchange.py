@@ -54,6 +54,8 @@ class Exchange:
             None if settings.in_lockstep else timeout_ns,
         )
         self.phase = Phase.WAITING
+        self._last: Values = {}
+        """The outputs that were published last."""
         self._safe_inputs = _in_model_units(topics, "inputs")
         self._safe_outputs = _in_model_units(topics, "outputs")
 
@@ -76,7 +78,7 @@ class Exchange:
         self.samples.forget()
         self.model.begin(inputs)
         self.phase = Phase.RUNNING
-        self._publish(self.model.read(self._outputs))
+        self._tell(self.model.read(self._outputs))
 
     def step(self, now_ns: int) -> None:
         """Do a step with the samples that there are, or go on without the peers."""
@@ -100,6 +102,10 @@ class Exchange:
         values = self.model.read(self._outputs)
         if self.phase is Phase.LOST and self._settings.on_loss == "failsafe":
             values |= self._safe_outputs
+        self._tell(values)
+
+    def _tell(self, values: Values) -> None:
+        self._last = values
         self._publish(values)
 
     def lose(self, reason: str) -> None:
@@ -110,7 +116,7 @@ class Exchange:
 
     def failsafe(self) -> Values:
         """The values of all outputs, safe where the file of topics says so; as the node ends."""
-        return {**self.model.read(self._outputs), **self._safe_outputs}
+        return {**self._last, **self._safe_outputs}
 
 
 def _in_model_units(topics: Topics, side: str) -> dict[str, float]:

@@ -6,14 +6,17 @@ from __future__ import annotations
 
 import signal
 import sys
+import traceback
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import partial, wraps
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from grasp_cosim import InputError, SimulationError
+from rclpy.duration import Duration
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -37,7 +40,13 @@ LOOK_INTERVAL = 0.05
 DIAGNOSTICS_INTERVAL = 1.0
 """s."""
 
-INPUT_ERROR, SIMULATION_ERROR = 2, 3
+MOST_LINES = 100
+"""So many different lines, at most, an exchange logs of messages that do not fit."""
+
+LAST_WORDS = 0.5
+"""s; so long, at most, the peers have to take what is sent as the exchange ends."""
+
+INTERNAL_ERROR, INPUT_ERROR, SIMULATION_ERROR = 1, 2, 3
 """Exit codes, as those of the command grasp-cosim."""
 
 
@@ -49,6 +58,26 @@ class Told(NamedTuple):
     encode: Encode
 
 
+Transition = Callable[["FmuNode", Any], TransitionCallbackReturn]
+
+
+def _in_words(transition: Transition) -> Transition:
+    """A transition that says why it fails: ROS does not."""
+
+    @wraps(transition)
+    def told(node: FmuNode, state: Any) -> TransitionCallbackReturn:
+        try:
+            return transition(node, state)
+        except (InputError, SimulationError) as error:
+            node.fail(str(error), INPUT_ERROR)
+            return FAILURE
+        except Exception:
+            node.fail(traceback.format_exc(), INTERNAL_ERROR)
+            raise
+
+    return told
+
+
 class FmuNode(LifecycleNode):  # type: ignore[misc]
     """A model as a node."""
 
@@ -58,27 +87,24 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
         self.exit_code: int | None = None
         """Set where the process is to end."""
         self._autostart = bool(self.get_parameter("autostart").value)
+        self._model: Model | None = None
         self._exchange: Exchange | None = None
         self._undo: list[Callable[[], None]] = []
         """What deactivation takes back, in this order."""
         self._ticker: Any = None
+        self._told: list[Told] = []
+        self._unmatched: set[str] = set()
+        """Topics that no peer was found to publish since the activation."""
         self._last_reason = ""
-        self._refusals: set[str] = set()
+        self._told_lines: set[str] = set()
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.create_timer(DIAGNOSTICS_INTERVAL, self._tell_status)
 
     # Transitions ------------------------------------------------------------------------------
 
+    @_in_words
     def on_configure(self, state: Any) -> TransitionCallbackReturn:
         """Load the model, check the topics, declare the parameters."""
-        try:
-            self._configure()
-        except InputError as error:
-            self._fail(str(error), INPUT_ERROR)
-            return FAILURE
-        return SUCCESS
-
-    def _configure(self) -> None:
         self._settings = settings = settings_of(self)
         system = settings.model_system()
         self._topics = read_topics(Path(settings.topics), system)
@@ -86,19 +112,21 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
         recorded = bool(settings.out)
         model = Model(system, settings.period or None, settings.stop or None, recorded)
         try:
-            self._told = [self._publisher(topic, model) for topic in self._topics.publish]
-            self._decoders = {
-                topic.name: decoder(f"{settings.topics}: subscribe.{topic.name}", topic)
-                for topic in self._topics.subscribe
+            self._encoders = {
+                t.name: encoder(f"{settings.topics}: publish.{t.name}", t, int(model.period_ns))
+                for t in self._topics.publish
             }
-            self._clock_publisher = (
-                self.create_publisher(Clock, "/clock", 10) if settings.publish_clock else None
-            )
-            self._parameters = ModelParameters(self, model, self._topics.inputs)
+            self._decoders = {
+                t.name: decoder(f"{settings.topics}: subscribe.{t.name}", t)
+                for t in self._topics.subscribe
+            }
+            self._model_parameters = ModelParameters(self, model, self._topics.inputs)
         except BaseException:
             model.close()
             raise
         self._model = model
+        self._period_ns = int(model.period_ns)
+        return SUCCESS
 
     def _check(self, settings: Settings, topics: Topics) -> None:
         """InputError where settings and topics do not fit each other."""
@@ -113,28 +141,61 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
                 "on_loss = failsafe"
             )
 
-    def _publisher(self, topic: Topic, model: Model) -> Told:
-        place = f"{self._settings.topics}: publish.{topic.name}"
-        cls, encode = encoder(place, topic, int(model.period_ns))
-        return Told(topic, self.create_lifecycle_publisher(cls, topic.name, _qos(topic)), encode)
-
+    @_in_words
     def on_activate(self, state: Any) -> TransitionCallbackReturn:
         """Begin to listen; the model begins with the first samples, or sends the first ones."""
-        super().on_activate(state)
-        settings = self._settings
-        self._refusals.clear()
+        settings, model = self._settings, self._model
+        if model is None:
+            return FAILURE
+        self._told_lines.clear()
         self._last_reason = ""
-        self._exchange = Exchange(self._model, self._topics, settings, self._publish, self._lost)
+        self._exchange = Exchange(model, self._topics, settings, self._publish, self._lost)
+        self._unmatched = {topic.name for topic in self._topics.subscribe}
         for topic in self._topics.subscribe:
-            cls, decode = self._decoders[topic.name]
-            take = self._taker(topic.name, decode)
-            subscription = self.create_subscription(cls, topic.name, take, _qos(topic))
-            self._undo.append(partial(self.destroy_subscription, subscription))
+            self._listen(topic)
         self._deadline = self._timer(settings.timeout, self._on_deadline)
         self._deadline.cancel()
-        if settings.initiate or not self._topics.subscribe:
-            self._looking = self._timer(LOOK_INTERVAL, self._look_for_peers)
-        return SUCCESS
+        self._looking = self._timer(LOOK_INTERVAL, self._look_for_peers)
+        return super().on_activate(state)
+
+    def _listen(self, topic: Topic) -> None:
+        """Subscribe to a topic until deactivation."""
+        cls, decode = self._decoders[topic.name]
+
+        def matched(status: Any) -> None:
+            if status.current_count:
+                self._unmatched.discard(topic.name)
+                self._look_for_peers()
+
+        subscription = self.create_subscription(
+            cls,
+            topic.name,
+            self._taker(topic.name, decode),
+            _qos(topic),
+            event_callbacks=SubscriptionEventCallbacks(matched=matched),
+        )
+        self._undo.append(partial(self.destroy_subscription, subscription))
+
+    def _open_publishers(self) -> None:
+        """Make the publishers, which live until deactivation.
+
+        In lockstep one side, which sends the first sample, makes them at once; the other one once
+        it hears that side. So nothing is sent before both are there to take it.
+        """
+        if self._settings.publish_clock:
+            self._clock_publisher = self.create_publisher(Clock, "/clock", 10)
+            self._undo.append(partial(self.destroy_publisher, self._clock_publisher))
+        for topic in self._topics.publish:
+            cls, encode = self._encoders[topic.name]
+            publisher = self.create_publisher(cls, topic.name, _qos(topic))
+            self._told.append(Told(topic, publisher, encode))
+        self._undo.append(self._close_publishers)
+
+    def _close_publishers(self) -> None:
+        for told in self._told:
+            told.publisher.wait_for_all_acked(Duration(seconds=LAST_WORDS))
+            self.destroy_publisher(told.publisher)
+        self._told.clear()
 
     def _timer(self, period: float, callback: Callable[[], None], clock: Any = None) -> Any:
         """A timer that lives until deactivation."""
@@ -142,44 +203,56 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
         self._undo.append(partial(self.destroy_timer, timer))
         return timer
 
+    @_in_words
     def on_deactivate(self, state: Any) -> TransitionCallbackReturn:
         """End the exchange, with safe outputs."""
         self._end_exchange()
         return super().on_deactivate(state)
 
+    @_in_words
     def on_cleanup(self, state: Any) -> TransitionCallbackReturn:
         """Free the model."""
-        self._parameters.remove()
-        for told in self._told:
-            self.destroy_lifecycle_publisher(told.publisher)
-        if self._clock_publisher is not None:
-            self.destroy_publisher(self._clock_publisher)
-        self._model.close()
+        self._release()
         return SUCCESS
 
+    @_in_words
     def on_shutdown(self, state: Any) -> TransitionCallbackReturn:
         """End the exchange, with safe outputs, and free the model."""
         self._end_exchange()
-        if state.label != "unconfigured":
-            self.on_cleanup(state)
+        self._release()
         self.exit_code = self.exit_code or 0
         return SUCCESS
+
+    def on_error(self, state: Any) -> TransitionCallbackReturn:
+        """After a failure within a transition: end the exchange, and be as at the start."""
+        self._end_exchange()
+        self._release()
+        return SUCCESS
+
+    def _release(self) -> None:
+        """Free the model, and take its parameters away."""
+        model, self._model = self._model, None
+        if model is not None:
+            self._model_parameters.remove()
+            model.close()
 
     def _end_exchange(self) -> None:
         """Publish the safe values, stop listening, and keep the result."""
         if self._exchange is None:
             return
         exchange, self._exchange = self._exchange, None
-        while self._undo:
-            self._undo.pop()()
-        if self._model.is_begun:
+        model = exchange.model
+        if model.is_begun:
             values = exchange.failsafe()
             for told in self._told:
                 if any(entry.name in self._topics.failsafe for entry in told.topic.entries):
                     self._send(told, values)
-            self._model.end()
+        while self._undo:
+            self._undo.pop()()
+        if model.is_begun:
+            model.end()
             if self._settings.out:
-                self._model.session.result().save(self._settings.out)
+                model.session.result().save(self._settings.out)
         count = exchange.samples.count
         self.get_logger().info(
             f"{count.steps} steps, {count.misses} missed, {count.late} samples late, "
@@ -195,7 +268,7 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
             try:
                 action()
             except (InputError, SimulationError) as error:
-                self._fail(str(error), SIMULATION_ERROR)
+                self.fail(str(error), SIMULATION_ERROR)
             if self._exchange and self._exchange.phase is Phase.ENDED:
                 self.get_logger().info("the stop time was reached")
                 self._stop(0)
@@ -213,7 +286,7 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
                 values = decode(message)
             except InputError as error:
                 exchange.samples.count.refused += 1
-                self._tell_once(f"{name}: {error}")
+                self._tell_error_once(f"{name}: {error}")
                 return
             self._guarded(lambda: self._take(exchange, name, values))()
 
@@ -228,30 +301,29 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
             self._deadline.reset()
 
     def _look_for_peers(self) -> None:
-        """Send the first sample once the peers are there to take it."""
-        absent = self._absent_peers()
-        if absent:
-            self._tell_once(f"waits for {', '.join(absent)}", severity="info")
+        """Speak once all peers are heard, and send the first sample once all of them listen."""
+        exchange, settings = self._exchange, self._settings
+        if exchange is None:
+            return
+        absent = sorted(f"a publisher of {name}" for name in self._unmatched)
+        hears_all = not absent or not settings.in_lockstep
+        if not self._told and (hears_all or settings.initiate):
+            self._open_publishers()
+        absent += [
+            f"a subscriber of {told.topic.name}"
+            for told in self._told
+            if not told.publisher.get_subscription_count()
+        ]
+        if absent and settings.in_lockstep:
+            line = f"waits for {', '.join(absent)}"
+            if self._is_new(line):
+                self.get_logger().info(line)
             return
         self._looking.cancel()
-        if self._exchange and self._exchange.phase is Phase.WAITING:
-            self._exchange.start()
+        begins = settings.initiate or not self._topics.subscribe
+        if begins and exchange.phase is Phase.WAITING:
+            exchange.start()
             self._run(first=True)
-
-    def _absent_peers(self) -> list[str]:
-        if not self._settings.in_lockstep:
-            return []
-        listeners = [
-            f"a subscriber of {t.topic.name}"
-            for t in self._told
-            if not t.publisher.get_subscription_count()
-        ]
-        speakers = [
-            f"a publisher of {topic.name}"
-            for topic in self._topics.subscribe
-            if not self.count_publishers(topic.name)
-        ]
-        return listeners + speakers
 
     def _run(self, first: bool = False) -> None:
         """Have steps begin: by the clock, or by the samples, each with its deadline."""
@@ -262,7 +334,7 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
         self._tick_origin = self._now_ns()
         self._ticks = 0
         if self._ticker is None:
-            period = 1e-9 * int(self._model.period_ns)
+            period = 1e-9 * self._period_ns
             self._ticker = self._timer(period, self._on_tick, self.get_clock())
             self._undo.append(self._forget_ticker)
 
@@ -278,7 +350,7 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
         exchange, now = self._exchange, self._now_ns()
         if exchange is None or exchange.phase is Phase.WAITING:
             return
-        period = int(self._model.period_ns)
+        period = self._period_ns
         due = (now - self._tick_origin) // period - self._ticks
         if due < 0:
             self._loss_by_clock(f"the clock went back by {-due} periods")
@@ -300,7 +372,7 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
         return int(self.get_clock().now().nanoseconds)
 
     def _publish(self, values: Mapping[str, float]) -> None:
-        if self._clock_publisher is not None:
+        if self._settings.publish_clock:
             self._clock_publisher.publish(Clock(clock=self._stamp()))
         for told in self._told:
             self._send(told, values)
@@ -313,7 +385,8 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
 
     def _stamp(self) -> Any:
         """The time of the model where it makes the time, else that of the node."""
-        if self._settings.publish_clock or self._settings.in_lockstep:
+        makes_time = self._settings.publish_clock or self._settings.in_lockstep
+        if makes_time and self._model is not None:
             return Time(nanoseconds=int(self._model.time_ns)).to_msg()
         return self.get_clock().now().to_msg()
 
@@ -327,7 +400,7 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
             self._stop(SIMULATION_ERROR)
         elif self._settings.in_lockstep:
             self._deadline.cancel()
-            period = 1e-9 * int(self._model.period_ns)
+            period = 1e-9 * self._period_ns
             self._alone = self._timer(period, self._on_alone)
 
     def _on_alone(self) -> None:
@@ -337,7 +410,8 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
         else:
             self._alone.cancel()
 
-    def _fail(self, reason: str, exit_code: int) -> None:
+    def fail(self, reason: str, exit_code: int) -> None:
+        """Say why the exchange ends, or does not begin."""
         self._last_reason = reason
         self.get_logger().error(reason)
         if self._exchange is not None:
@@ -351,10 +425,16 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
         if self._autostart:
             self.exit_code = exit_code
 
-    def _tell_once(self, line: str, severity: str = "error") -> None:
-        if line not in self._refusals and len(self._refusals) < 100:
-            self._refusals.add(line)
-            getattr(self.get_logger(), severity)(line)
+    def _is_new(self, line: str) -> bool:
+        """True for a line that was not logged since the activation; of too many the rest is not."""
+        if line in self._told_lines or len(self._told_lines) >= MOST_LINES:
+            return False
+        self._told_lines.add(line)
+        return True
+
+    def _tell_error_once(self, line: str) -> None:
+        if self._is_new(line):
+            self.get_logger().error(line)
 
     def _tell_status(self) -> None:
         """Publish the diagnostics, and look for peers that speak of something else."""
@@ -375,7 +455,7 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
                         f"{topic.name}: {peer.node_name} publishes {peer.topic_type}; must be "
                         f"{topic.type}"
                     )
-                    self._tell_once(self._last_reason)
+                    self._tell_error_once(self._last_reason)
 
 
 def _qos(topic: Topic) -> QoSProfile:

@@ -16,6 +16,7 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
+from rclpy.exceptions import ParameterException
 
 from .model import Model
 from .settings import DESCRIPTIONS, Settings
@@ -51,19 +52,20 @@ class ModelParameters:
         """
         self._node, self._model = node, model
         self._known = model.parameters(driven)
-        self._callback = node.add_on_set_parameters_callback(self._set)
+        node.add_on_set_parameters_callback(self._set)
         self._declared: list[str] = []
         for name, (variable, tunable) in self._known.items():
             value = _as_told(variable, model.start(name, variable))
             try:
                 node.declare_parameter(name, value, _descriptor(variable, tunable))
-            except Exception as error:
+            except ParameterException as error:
+                self.remove()
                 raise InputError(f"parameter {name}: {' '.join(str(error).split())}") from error
             self._declared.append(name)
 
     def remove(self) -> None:
         """Take them away from the node."""
-        self._node.remove_on_set_parameters_callback(self._callback)
+        self._node.remove_on_set_parameters_callback(self._set)
         for name in self._declared:
             self._node.undeclare_parameter(name)
 
