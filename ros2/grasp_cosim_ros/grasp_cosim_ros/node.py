@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from grasp_cosim import InputError, SimulationError
+from rclpy.clock import JumpThreshold
 from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -337,6 +338,11 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
             period = 1e-9 * self._period_ns
             self._ticker = self._timer(period, self._on_tick, self.get_clock())
             self._undo.append(self._forget_ticker)
+            backwards = JumpThreshold(
+                min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=False
+            )
+            jumps = self.get_clock().create_jump_callback(backwards, post_callback=self._on_jump)
+            self._undo.append(jumps.unregister)
 
     def _forget_ticker(self) -> None:
         self._ticker = None
@@ -352,9 +358,7 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
             return
         period = self._period_ns
         due = (now - self._tick_origin) // period - self._ticks
-        if due < 0:
-            self._loss_by_clock(f"the clock went back by {-due} periods")
-        elif due * period > 1e9 * self._settings.stall:
+        if due * period > 1e9 * self._settings.stall:
             self._loss_by_clock(f"a step began {1e-9 * due * period:.3g} s late")
         else:
             for _ in range(due):
@@ -362,6 +366,10 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
                     return
                 exchange.step(now)
             self._ticks += due
+
+    def _on_jump(self, jump: Any) -> None:
+        """A clock that goes back is that of a simulation that has begun again."""
+        self._loss_by_clock(f"the clock went back by {-1e-9 * jump.delta.nanoseconds:.9g} s")
 
     def _loss_by_clock(self, reason: str) -> None:
         self._tick_origin, self._ticks = self._now_ns(), 0
