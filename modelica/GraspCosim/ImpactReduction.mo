@@ -32,7 +32,8 @@ initial equation
 equation
   for j in 1:2 loop
     der(x[j]) = v[j];
-    light[j] = viscosity[j]*log(noEvent(max(intensity[j], intensity_floor))) "(5), integrated";
+    light[j] = viscosity[j]*log(noEvent(max(1, intensity[j]/intensity_floor)))
+      "Eq. (5), integrated";
     mass*(v[j] - target_velocity) = braked[j] + light[j];
     der(braked[j]) = -damping*(v[j] - target_velocity) - stiffness*(x[j] - target_position)
       "Eq. (6) with (5), integrated: f_pj is the rate of the impulse";

@@ -26,7 +26,7 @@ equation
       points = {{82, 0}, {92, 0}, {92, 60}, {-92, 60}, {-92, 0}, {-82, 0}}));
   annotation (
     Documentation(info = "<html>
-<p>plant -> sensors -> controller -> plant. Another object is a modification:
+<p>The controller closes the loop. Another object is a modification:
 Loop(redeclare PlantMovable plant). So is another place of it:
 Loop(plant(initial_object_position = 0)).</p>
 </html>"),

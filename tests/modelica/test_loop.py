@@ -4,16 +4,20 @@ rumoca gives samples 0.1 ms apart; the contact is the zero of a straight line be
 Our contact times have an error of first order in the step: two steps give their limit.
 """
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from docs.test_interoperability import ROWS
 from grasp_cosim import grasp_system, simulate
 from support.foreign_tools import python_with, run_in
 
+PACKAGE = str(Path(__file__).parents[2] / "modelica")
 CASES = (0, 1, 2)
 PLACES = (-0.03, -0.02, -0.01, 0.0, 0.01, 0.02, 0.03)  # m
 STEP = 2e-5  # s
 FINGERS = (1, 2)
+(ROW,) = (r for r in ROWS if "`tests/modelica/test_loop.py`" in r.by)
 
 RUMOCA = """
 from rumoca import Session, SimConfig
@@ -39,8 +43,6 @@ end It;
 
 def integrated(folder, plant, runs):
     """By rumoca, for cases and places in m: the contact times in s, and the object at the end."""
-    (row,) = rows = [r for r in ROWS if "`tests/modelica/test_loop.py`" in r.by]
-    assert rows
     models = [
         LOOP.format(
             plant=plant, place=place, layer_3=str(case > 1).lower(), layer_2=str(case > 0).lower()
@@ -48,10 +50,9 @@ def integrated(folder, plant, runs):
         for case, place in runs
     ]
     names = [f"plant.position[{j}]" for j in FINGERS] + ["plant.object_position"]
-    package = __file__.partition("/tests/")[0] + "/modelica"
-    given = {"folder": package, "models": models, "signals": names}
-    found = run_in(python_with(row.tool, row.version), RUMOCA, folder, given)
-    return [(_contacts(f), f["plant.object_position"][-1]) for f in found], row
+    given = {"folder": PACKAGE, "models": models, "signals": names}
+    found = run_in(python_with(ROW.tool, ROW.version), RUMOCA, folder, given)
+    return [(_contacts(f), f["plant.object_position"][-1]) for f in found]
 
 
 def _contacts(signals):
@@ -78,7 +79,7 @@ def contacts(run):
 @pytest.mark.interop
 def test_contact_times_of_the_rigid_object(tmp_path):
     runs = [(case, place) for case in CASES for place in PLACES]
-    theirs, row = integrated(tmp_path, "plant", runs)
+    theirs = integrated(tmp_path, "plant", runs)
     system = grasp_system()
     deviations = [
         np.abs(
@@ -87,16 +88,34 @@ def test_contact_times_of_the_rigid_object(tmp_path):
         for run, (t, _) in zip(runs, theirs, strict=True)
     ]
     largest = np.max(deviations)
-    assert int(row.value.split()[0]) == 2 * len(runs)
-    assert largest <= float(row.deviation.split()[0])
-    assert float(row.deviation.split()[0]) <= 1e-5
+    assert int(ROW.value.split()[0]) == 2 * len(runs)
+    assert largest <= float(ROW.deviation.split()[0])
+    assert float(ROW.deviation.split()[0]) <= 1e-5
+
+
+REDECLARED = """
+from rumoca import Session
+session = Session([given["folder"]])
+for example in ("Loop", "Examples.Case2"):
+    redeclared = f"GraspCosim.{example}(redeclare GraspCosim.PlantMovable plant)"
+    text = f"model It extends {redeclared}; end It;"
+    model = session.loads(text, model="It", filename="it.mo")
+    found.append("plant.object_mass" in model.parameters.names)
+"""
+
+
+@pytest.mark.interop
+def test_a_redeclaration_two_levels_below_is_ignored(tmp_path):
+    """Where it is not, the page has one row less."""
+    python = python_with(ROW.tool, ROW.version)
+    assert run_in(python, REDECLARED, tmp_path, {"folder": PACKAGE}) == [True, False]
 
 
 @pytest.mark.interop
 def test_contact_times_and_the_way_of_the_box(natives, tmp_path):
     """In Case 1 one finger pushes it across to the other one, 55 mm."""
     runs = [(0, 0.03), (1, 0.03), (2, 0.03), (2, 0.0), (2, -0.02)]
-    theirs, _ = integrated(tmp_path, "redeclare GraspCosim.PlantMovable plant", runs)
+    theirs = integrated(tmp_path, "redeclare GraspCosim.PlantMovable plant", runs)
     system = grasp_system().swap("plant", natives / "GripperPlantMovable.fmu")
     for run, (times, place) in zip(runs, theirs, strict=True):
         result = ours(system, *run, 1e-4)

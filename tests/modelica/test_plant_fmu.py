@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from docs.test_interoperability import ROWS
+from fmpy import simulate_fmu
 from grasp_cosim import InputError, SimulationError, System, cli, grasp_system, qualify, simulate
 from support.foreign_tools import call, python_with
 
@@ -81,6 +82,17 @@ def test_the_plant_with_the_box_in_the_loop(python, natives, fmi, kind, tmp_path
     assert theirs["plant.object_position"][-1] == pytest.approx(
         ours["plant.object_position"][-1], abs=3e-5
     )
+
+
+@pytest.mark.interop
+@both_versions
+def test_the_sensor_in_the_loop(python, fmi, tmp_path):
+    """On finger 1; it has no state, and one input and output."""
+    fmu = compiled(python, tmp_path, "GraspCosim.Sensor", fmi)
+    theirs = simulate(grasp_system().swap("sensor_1", fmu), stop=2.0)
+    ours = simulate(grasp_system(), stop=2.0)
+    name = "sensor_1.intensity"
+    assert np.abs(theirs[name] - ours[name]).max() <= 1e-6 * np.abs(ours[name]).max()
 
 
 # What rumoca cannot do: where it can, the page has one row less
@@ -166,6 +178,17 @@ equation
   f = if gap > 0 then 0 else max(0, 2 - m*(400*v + 40000*gap));
 end Contact;
 """
+
+
+@pytest.mark.interop
+def test_fmpy_loads_no_fmu_for_fmi_3(plants):
+    """rumoca leaves out a function of scheduled execution; by FMI 2.0 FMPy runs both kinds."""
+    push = {"force[1]": -2.0, "force[2]": 2.0}
+    for kind in SOLVERS:
+        result = simulate_fmu(plants[2], fmi_type=kind, start_values=push, stop_time=0.5)
+        assert result["gap[1]"][-1] == pytest.approx(0.0, abs=1e-6)
+        with pytest.raises(AttributeError, match="fmi3ActivateModelPartition"):
+            simulate_fmu(plants[3], validate=False, fmi_type=kind, stop_time=0.5)
 
 
 @pytest.mark.interop
