@@ -1,6 +1,7 @@
 """The Modelica package as files: each class where Modelica tools look for it, by two parsers."""
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -63,6 +64,12 @@ def test_the_order_of_a_package_has_all_its_classes(folder):
     listed = (folder / "package.order").read_text("utf-8").split()
     classes = {p.stem for p in folder.glob("*.mo")} - {"package"}
     assert sorted(listed) == sorted(classes | {p.parent.name for p in folder.glob("*/package.mo")})
+
+
+def test_the_package_has_the_version_of_the_project():
+    project = tomllib.loads((FOLDER.parent / "pyproject.toml").read_text("utf-8"))["project"]
+    text = (PACKAGE / "package.mo").read_text("utf-8")
+    assert re.findall(r'^    version = "(.*)",$', text, re.M) == [project["version"]]
 
 
 def test_the_readme_has_all_files():
