@@ -62,7 +62,8 @@ platforms: .venv/platforms run
 	.ci/platform bookworm arm64 make run test TESTS="$(ON_ARM)"
 
 interop: .venv/interop
-	$(PYTEST) -m interop
+	GRASP_COSIM_TOOLS="$$GRASP_COSIM_TOOLS:$$(ls "$(CURDIR)"/.venv/*-[0-9]*/bin/python | tr '\n' :)" \
+		$(PYTEST) -m interop
 
 explore: .venv/dev
 	$(PYTEST) -m "hypothesis or campaign" --hypothesis-profile explore --hypothesis-seed $(SEED)
@@ -114,8 +115,13 @@ playground: .venv/run
 .venv/platforms: TOOLS := ziglang
 .venv/interop: TOOLS := pyssp-standard pythonfmu3 fmu-manipulation-toolbox
 .venv/mutants: TOOLS := cosmic-ray pytest-cov
+# Each in its own environment: one version of rumoca writes FMUs, the other one simulates.
+.venv/interop: APART := rumoca==0.9.13 rumoca==0.10.2 pymoca==0.12.0 modelica-builder==0.8.0
 .venv/platforms .venv/interop .venv/mutants: .venv/dev
 	@for tool in $(TOOLS); do $(PIP) $$tool || { echo "not installed: $$tool"; without=$$tool; }; done; \
+	for tool in $(APART); do at=.venv/$$(echo $$tool | sed s/==/-/); \
+		$(PYTHON) -m venv $$at && $$at/bin/pip install --quiet $$tool \
+		|| { echo "not installed: $$tool"; without=$$tool; }; done; \
 	[ -n "$$without" ] || touch $@
 
 clean:

@@ -81,6 +81,13 @@ def test_it_puts_no_general_name_into_site_packages(wheel):
     }  # fmt: skip
 
 
+def test_the_modelica_package_is_where_its_page_links_to(wheel):
+    names = zipfile.ZipFile(wheel).namelist()
+    page = "grasp_cosim/docs/how_to/modelica.md"
+    assert {page, "grasp_cosim/docs/modelica_fmu.py", "grasp_cosim/modelica/README.md"} <= {*names}
+    assert sum(name.startswith("grasp_cosim/modelica/GraspCosim/") for name in names) == 18
+
+
 def test_the_page_on_a_plant_of_ones_own_runs_as_it_is_written(python, tmp_path):
     """Both of its parts, from the top, in an empty folder; the page is in the wheel as well."""
 

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 from conftest import alter
-from grasp_cosim import InputError, SimulationError, System
+from grasp_cosim import InputError, SimulationError, System, cli
 from grasp_cosim.comparison.bands import Bands, Given, read_bands
 from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.comparison.summary import qualification_json as as_json
 from grasp_cosim.comparison.summary import qualification_text as as_text
 from grasp_cosim.comparison.summary import reason
 from support.marks import slow
-from support.native_fmus import build, needs_gcc
+from support.native_fmus import build, build_model, needs_gcc
 
 NUMERICS = ("every second sample", "step 0.002 s", "scheme jacobi")
 
@@ -306,3 +306,42 @@ def test_a_candidate_that_did_not_run_shows_why(short, fmus):
     assert not blocked
     assert "the interface does not fit" in repr(blocked)
     assert "the interface does not fit" in blocked._repr_html_()
+
+
+SOLVED = (
+    "x: other.fmu runs by model exchange, integrated by CVode with a relative tolerance of 1e-08"
+)
+
+
+@pytest.fixture
+def decay(tmp_path):
+    """A decay by co-simulation, and the same as an FMU of both kinds."""
+    build_model("dahlquist", tmp_path, "2.0", ("CoSimulation",))
+    other = build_model("dahlquist", tmp_path, file="other")
+    path = tmp_path / "system.toml"
+    path.write_text(
+        "[experiment]\nstep = 0.1\nstop = 1.0\n"
+        '[components.x]\nfmu = "dahlquist.fmu"\nvalues = { u = 0.0 }\n',
+        "utf-8",
+    )
+    return System.load(path), other
+
+
+@needs_gcc
+def test_a_candidate_of_both_kinds_runs_by_model_exchange_with_options_of_a_solver(decay):
+    """They are not those of the original, which is for co-simulation."""
+    system, other = decay
+    for solver, solved in ((None, False), ({"relative_tolerance": 1e-8}, True)):
+        found = qualify(system, "x", other, solver=solver, isolation="none")
+        assert (SOLVED in found.comparison.notes) == solved
+    with pytest.raises(InputError, match=r"^--set components.x.solver: unknown entry 'tolerance'"):
+        qualify(system, "x", other, solver={"tolerance": 1e-8})
+
+
+@needs_gcc
+def test_the_command_gives_the_options_of_a_solver_to_the_candidate(decay, tmp_path, capsys):
+    _, other = decay
+    options = ("--as", "x", "--system", str(tmp_path / "system.toml"))
+    solver = ("--set", "components.x.solver.relative_tolerance=1e-8")
+    cli.main(["qualify", str(other), *options, *solver])
+    assert SOLVED in capsys.readouterr().out.splitlines()

@@ -17,7 +17,7 @@ from ..comparison.qualify import qualify as run_qualification
 from ..interface.read import check_runs
 from ..recording.log_names import LogNames
 from ..system.description import FILES
-from ..system.overrides import SECTIONS, Override
+from ..system.overrides import SECTIONS, Override, plain
 from .frame import (
     NEGATIVE,
     PATH,
@@ -43,7 +43,7 @@ from .options import (
     stop_option,
 )
 
-OF_CANDIDATE = ("rename", "units", "isolation")
+OF_CANDIDATE = ("rename", "units", "isolation", "solver")
 """Entries of its component that are those of the candidate."""
 
 
@@ -85,7 +85,8 @@ def qualify(
 
     These keys of --set begin with components.COMPONENT: rename.VARIABLE=NAME maps a variable to its
     name in the candidate, and units.VARIABLE=UNIT corrects a unit. The candidate runs in a separate
-    process, except with isolation=none.
+    process, except with isolation=none. With solver.relative_tolerance=1e-6 it runs by model
+    exchange, if it can.
 
     \b
     Example: grasp-cosim qualify vendor.fmu --as plant -o qualification.html
@@ -106,6 +107,7 @@ def qualify(
         values={override.place: override.value for override in each_once(values)},
         bands=read_bands(bands) if bands else None,
         isolation=of_component["isolation"].get("", "process"),
+        solver={key: plain(value) for key, value in of_component["solver"].items()} or None,
         progress=not is_quiet(),
         metrics=chosen_metrics(metric_files),
     )

@@ -27,8 +27,9 @@ from ..metrics.metric import Metric
 from ..recording.result import Result
 from ..system.changes import converted, replaced
 from ..system.description import System, as_system
-from ..system.overrides import as_overrides
-from ..system.parts import ISOLATIONS, Component, Connection, Isolation
+from ..system.entries import with_options
+from ..system.overrides import Override, as_overrides
+from ..system.parts import ISOLATIONS, Component, Connection, Isolation, Solver
 from ..system.structure import SCHEMES, unit_of
 from ..system.times import NANOSECONDS, in_seconds
 from ..system.validity import connection_transform, transforms
@@ -44,6 +45,9 @@ from .judge import Judge
 from .outcome import QualificationData, Swap
 from .side import Side, differences, side_of, unread
 from .summary import short_qualification
+
+SET = "--set {place}"
+"""The origin of what is set for a swap."""
 
 END = Metric(
     "end_of_run", lambda run: float(run.time[-1]), "s", "where an FMU asked for the end, else stop"
@@ -82,6 +86,7 @@ def qualify(
     values: Mapping[str, Value] | None = None,
     bands: Bands | None = None,
     isolation: Isolation = "process",
+    solver: Mapping[str, float] | None = None,
     progress: bool = False,
     metrics: Sequence[Metric] = (),
 ) -> Qualification:
@@ -103,6 +108,8 @@ def qualify(
         bands: How far signals and metrics may be apart, as read_bands() has it from a file. What it
             does not name is derived from runs of the original.
         isolation: "process" runs the candidate in its own process, "none" in this one.
+        solver: Options of the candidate's solver by their names, such as relative_tolerance. An FMU
+            of both kinds then runs by model exchange. None keeps what its component has.
         progress: True shows on standard error how far the runs are.
         metrics: Metrics to be compared in addition to those of the system.
 
@@ -123,7 +130,9 @@ def qualify(
     choice("isolation", isolation, ISOLATIONS)
     system = as_system(system, "qualify")
     fmu = candidate if isinstance(candidate, Component) else Path(candidate)
-    swap = prepare_swap(system, component, fmu, rename or {}, values or {}, isolation, units)
+    swap = prepare_swap(
+        system, component, fmu, rename or {}, values or {}, isolation, units, solver
+    )
     if swap.swapped is None:
         return Qualification(swap)
     definitions = tuple(m for m in metrics_of(system.metrics, metrics) if not m.reason)
@@ -230,6 +239,7 @@ def prepare_swap(
     values: Mapping[str, Value],
     isolation: Isolation,
     units: Mapping[str, str] | None = None,
+    solver: Mapping[str, float] | None = None,
 ) -> Swap:
     """The swap that qualify() describes; InputError where its arguments are wrong."""
     place = system.component(component, f"--as {component}")
@@ -237,12 +247,14 @@ def prepare_swap(
     former = candidate if isinstance(candidate, Component) else replace(place, values={})
     fmu = former.fmu if isinstance(candidate, Component) else candidate
     new = replaced(former, fmu, rename, units or {}, "")
+    if solver is not None:
+        new = _solved(new, component, solver)
     interface = renamed(new.sized(describe(fmu)), new.rename, "rename")
     interface = in_units(interface, new.units, "units")
     _check_renamed(rename, original, interface)
     common, extra = _divided(values, component, original, interface)
     extra = {n: v for n, v in new.values.items() if n not in original.by_name} | extra
-    system = system.with_overrides(as_overrides(common, "--set {place}")).untriggered()
+    system = system.with_overrides(as_overrides(common, SET)).untriggered()
     system = replace(system, record=system.record.with_outputs(system.components))
     use = use_of(system, component)
     differences = interface_differences(original, interface, use, extra)
@@ -273,6 +285,13 @@ def prepare_swap(
         for port, v in system.recorded.items()
     }
     return Swap(system, component, fmu, tuple(differences), swapped, back, nominals)
+
+
+def _solved(candidate: Component, name: str, solver: Mapping[str, float]) -> Component:
+    """The candidate, which is to have this name, with other options of its solver."""
+    place = f"components.{name}.solver"
+    options = {key: Override(f"{place}.{key}", value, SET) for key, value in solver.items()}
+    return replace(candidate, solver=with_options(place, candidate.solver or Solver(), options))
 
 
 def _divided(

@@ -85,8 +85,8 @@ def sections(
     record = system.record if system else Record()
     return {
         **experiment(tables["experiment"].values()),
-        "initialisation": _with_options("initialisation", loops, tables["initialisation"]),
-        "realtime": _with_options("realtime", pace, tables["realtime"]),
+        "initialisation": with_options("initialisation", loops, tables["initialisation"]),
+        "realtime": with_options("realtime", pace, tables["realtime"]),
         "verdict": _with_verdict(verdict, tables["verdict"]),
         "roles": roles,
         "input": _with_input(stimuli, tables["input"], folder),
@@ -154,7 +154,7 @@ def _with_verdict(verdict: Acceptance, overrides: Mapping[str, Override]) -> Acc
             name = place.removesuffix(f".{end}") if end else place
             older = entry_of.get(name, MetricLimit(name.removeprefix(METRICS)))
             entry_of[name] = _metric_limit(older, end, limit)
-    options = _with_options("verdict", verdict, single)
+    options = with_options("verdict", verdict, single)
     return replace(options, metrics=tuple(entry_of.values()))
 
 
@@ -187,7 +187,7 @@ def _metric_limit(limit: MetricLimit, end: str, override: Override) -> MetricLim
     return changed
 
 
-def _with_options(place: str, options: Options, overrides: Mapping[str, Override]) -> Options:
+def with_options(place: str, options: Options, overrides: Mapping[str, Override]) -> Options:
     """Options such as Initialisation, or a Solver, with overrides of their entries.
 
     The place is that of the table which has these.
@@ -277,7 +277,7 @@ def _with_entries(component: Component, overrides: ComponentOverrides) -> Compon
     if tolerances is not None:  # an empty table asks for the default solver
         place = f"components.{component.name}.solver"
         solver = component.solver or Solver()
-        component = replace(component, solver=_with_options(place, solver, tolerances))
+        component = replace(component, solver=with_options(place, solver, tolerances))
     return component
 
 

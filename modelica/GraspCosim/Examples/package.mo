@@ -1,0 +1,3 @@
+within GraspCosim;
+package Examples "Cases of the paper, and other objects"
+end Examples;
