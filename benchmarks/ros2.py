@@ -1,4 +1,4 @@
-"""What a node of ROS 2 costs: two topics there, a step, one topic back, next to DDS alone.
+"""What a node of ROS 2 costs: two topics there, a step, one topic back, next to only DDS.
 
 In the environment of ROS 2, in the folder of the checkout:
 
@@ -19,13 +19,13 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "ros2/grasp_cosim_ros"
-ROUNDS, TRIPS, WARM_UP = 5, 4000, 200
+ROUNDS, TRIPS, WARM_UP = 9, 4000, 200
 WHOS = ("echo", "node")
 DOMAIN = os.getpid() % 101
 
 
 def environment(domain: int) -> dict[str, str]:
-    """A domain of its own, on this machine only."""
+    """Its own domain, on this machine only."""
     return {
         **os.environ,
         "PYTHONPATH": os.pathsep.join([str(PACKAGE), os.environ.get("PYTHONPATH", "")]),
@@ -49,6 +49,7 @@ def node_command(fmu: str) -> list[str]:
 def echo() -> None:
     """Answer a sample of each topic by a command."""
     import rclpy
+    from rclpy.experimental.events_executor import EventsExecutor
     from sensor_msgs.msg import JointState
     from std_msgs.msg import Float64MultiArray
 
@@ -65,7 +66,9 @@ def echo() -> None:
 
     node.create_subscription(JointState, "joint_states", lambda _: take("joints"), 10)
     node.create_subscription(Float64MultiArray, "intensity", lambda _: take("light"), 10)
-    rclpy.spin(node)
+    executor = EventsExecutor()  # that of the node
+    executor.add_node(node)
+    executor.spin()
 
 
 def trips() -> None:
@@ -76,8 +79,6 @@ def trips() -> None:
 
     rclpy.init()
     node = rclpy.create_node("peer")
-    joints = node.create_publisher(JointState, "joint_states", 10)
-    light = node.create_publisher(Float64MultiArray, "intensity", 10)
     times: list[float] = []
     sent = 0.0
 
@@ -95,6 +96,8 @@ def trips() -> None:
             send()
 
     node.create_subscription(Float64MultiArray, "commands", take, 10)
+    joints = node.create_publisher(JointState, "joint_states", 10)  # it listens before
+    light = node.create_publisher(Float64MultiArray, "intensity", 10)
     peers = (joints.get_subscription_count, light.get_subscription_count)
     while not all(count() for count in peers) or not node.count_publishers("commands"):
         rclpy.spin_once(node, timeout_sec=0.05)
@@ -116,8 +119,8 @@ def measured(fmu: str, who: str, number: int) -> list[float]:
             env=given, stdout=subprocess.PIPE, text=True, timeout=120, check=True,
         )  # fmt: skip
     finally:
-        peer.terminate()
-        peer.wait(20)
+        peer.kill()
+        peer.wait()
     return [float(word) for word in done.stdout.split()]
 
 

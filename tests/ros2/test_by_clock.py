@@ -35,8 +35,9 @@ def sample():
 assert spin(lambda: joints.get_subscription_count() and light.get_subscription_count()
             and clock.get_subscription_count()
             and node.count_publishers("gripper_controller/commands"))
-tick(0)
-spin(lambda: False, 0.3)
+for _ in range(10):  # messages on /clock may get lost
+    tick(0)
+    spin(lambda: False, 0.1)
 sample()
 assert spin(lambda: wrist and grip)  # initialised
 for number in range(1, 6):

@@ -1,6 +1,7 @@
 """Our controller and our plant as two nodes over DDS, in lockstep."""
 
 import csv
+import time
 
 import pytest
 from grasp_cosim import simulate
@@ -77,6 +78,18 @@ def test_a_lost_controller_makes_the_forces_safe(domain, system_file, fmus, tmp_
     held = forces[first_safe - 1]
     before = forces[:first_safe]
     assert len(before) - max(i for i, f in enumerate(before) if f != held) - 1 == 1 + 2
+
+
+def test_by_the_clock_of_the_computer_both_keep_their_pace(domain, system_file, fmus):
+    settings = {"mode": "clock", "period": 0.01, "stall": 60.0, "misses_tolerated": 1000}
+    controller, plant = pair(domain, system_file, fmus, 1.0, plant=settings, controller=settings)
+    started = time.monotonic()
+    assert (domain.ended(controller), domain.ended(plant)) == (0, 0)
+    assert time.monotonic() - started >= 0.99  # s, for 100 steps from the first sample on
+    for node in (controller, plant):
+        last = lines_of(node, "INFO")[-1]
+        assert last.startswith("100 steps, ")
+        assert last.endswith(" 0 losses of the peers")
 
 
 def wait_for_steps(domain):

@@ -158,8 +158,7 @@ class Environment(Env[Floats, Floats]):
         session, values = self.session, np.asarray(action)
         if values.shape != self.action_space.shape:
             raise InputError(f"action = {action!r}: must be an array of {len(self._action_names)}")
-        for name, value in zip(self._action_names, values.tolist(), strict=True):
-            session.set(name, value)
+        session.set_all(dict(zip(self._action_names, values.tolist(), strict=True)))
         session.step(self._steps)
         is_over = session.complete or session.ended_at is not None
         is_terminated = bool(self._ends(session))

@@ -273,16 +273,36 @@ class Scenario:
             happen = self._setter(f"set: {name}", Event({port: value}))
             set_value = literal(value)  # now, as a list of its user's may change
         happen(step)
+        self._note(port, happen, set_value, step)
+
+    def set_all(self, values: Mapping[str, Given], step: int) -> None:
+        """Set several as set() does, the numbers of a component by one call of its FMU."""
+        numbers: dict[str, list[tuple[SettableNumber, float]]] = {}
+        for name, value in values.items():
+            scalar = self._scalars.get(name)
+            if scalar and type(value) is float and scalar.low <= value <= scalar.high:
+                numbers.setdefault(scalar.port.component, []).append((scalar, value))
+            else:
+                self.set(name, value, step)
+        for component, pairs in numbers.items():
+            self._instances[component].set([s.variable for s, _ in pairs], [v for _, v in pairs])
+            for scalar, value in pairs:
+                if scalar.slot is not None:
+                    self._values[scalar.slot] = value
+                self._note(scalar.port, partial(self._put, scalar, value), value, step)
+
+    def _note(
+        self, port: Port, happen: Callable[[int], Sequence[str]], value: float | str, step: int
+    ) -> None:
+        """Keep what was set: for FMUs that are loaded again, and for the log."""
         self._applied.pop(port, None)  # what is set last is set last again
         self._applied[port] = happen
         number = self._line_of.setdefault(port, len(self._lines))
         if number == len(self._lines):
-            self._lines.append(LogLine(step, str(port), set_value))
+            self._lines.append(LogLine(step, str(port), value))
         else:
             first = self._lines[number]
-            self._lines[number] = first._replace(
-                times=first.times + 1, last_step=step, last=set_value
-            )
+            self._lines[number] = first._replace(times=first.times + 1, last_step=step, last=value)
 
     def _settable_port(self, name: str, value: Given) -> Port:
         """The port of a name that can be set to a value, which is kept; InputError if it cannot."""

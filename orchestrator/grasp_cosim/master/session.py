@@ -486,6 +486,24 @@ class Session:
 
         self._call_fmus(set_all)
 
+    def set_all(self, values: Mapping[str, Given]) -> None:
+        """Set several variables as set() does; faster, as each FMU gets its numbers at once.
+
+        Args:
+            values: Values by names like "plant.force[1]".
+
+        Raises:
+            InputError: There is no such variable that may be set now, or a value does not fit; what
+                came before it may be set.
+            SimulationError: An FMU fails.
+        """
+        if self.system.inputs:
+            for name, value in values.items():
+                self.set(name, value)
+            return
+        set_all = self.master.scenario.set_all
+        self._call_fmus(lambda: set_all(values, self.master.steps_done))
+
     def save(self) -> State:
         """Keep the present state, to which restore() goes back.
 

@@ -150,8 +150,7 @@ class Model:
             SimulationError: An FMU fails.
         """
         session = self.session
-        for name, value in inputs.items():
-            session.set(name, value)
+        session.set_all(inputs)
         session.step(self._steps)
         return not session.complete and session.ended_at is None
 

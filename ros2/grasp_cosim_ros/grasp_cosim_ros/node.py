@@ -15,10 +15,11 @@ from typing import Any, NamedTuple
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from grasp_cosim import InputError, SimulationError
-from rclpy.clock import JumpThreshold
+from rclpy.clock import Clock as RosClock
+from rclpy.clock import ClockType, JumpThreshold
 from rclpy.duration import Duration
-from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
+from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
@@ -84,6 +85,7 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__("grasp_cosim")
+        self._steady = RosClock(clock_type=ClockType.STEADY_TIME)
         declare(self)
         self.exit_code: int | None = None
         """Set where the process is to end."""
@@ -92,14 +94,16 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
         self._exchange: Exchange | None = None
         self._undo: list[Callable[[], None]] = []
         """What deactivation takes back, in this order."""
-        self._ticker: Any = None
+        self._is_ticking = False
+        self._is_simulated = False
+        """True where the time is that of /clock."""
         self._told: list[Told] = []
-        self._unmatched: set[str] = set()
-        """Topics that no peer was found to publish since the activation."""
+        self._heard: dict[str, Any] = {}
+        """The subscriptions, by topic."""
         self._last_reason = ""
         self._told_lines: set[str] = set()
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self.create_timer(DIAGNOSTICS_INTERVAL, self._tell_status)
+        self.create_timer(DIAGNOSTICS_INTERVAL, self._tell_status, clock=self._steady)
 
     # Transitions ------------------------------------------------------------------------------
 
@@ -151,7 +155,8 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
         self._told_lines.clear()
         self._last_reason = ""
         self._exchange = Exchange(model, self._topics, settings, self._publish, self._lost)
-        self._unmatched = {topic.name for topic in self._topics.subscribe}
+        self._heard.clear()
+        self._is_simulated = bool(self.get_parameter("use_sim_time").value)
         for topic in self._topics.subscribe:
             self._listen(topic)
         self._deadline = self._timer(settings.timeout, self._on_deadline)
@@ -162,19 +167,9 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
     def _listen(self, topic: Topic) -> None:
         """Subscribe to a topic until deactivation."""
         cls, decode = self._decoders[topic.name]
-
-        def matched(status: Any) -> None:
-            if status.current_count:
-                self._unmatched.discard(topic.name)
-                self._look_for_peers()
-
-        subscription = self.create_subscription(
-            cls,
-            topic.name,
-            self._taker(topic.name, decode),
-            _qos(topic),
-            event_callbacks=SubscriptionEventCallbacks(matched=matched),
-        )
+        take = self._taker(topic.name, decode)
+        subscription = self.create_subscription(cls, topic.name, take, _qos(topic))
+        self._heard[topic.name] = subscription
         self._undo.append(partial(self.destroy_subscription, subscription))
 
     def _open_publishers(self) -> None:
@@ -198,9 +193,9 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
             self.destroy_publisher(told.publisher)
         self._told.clear()
 
-    def _timer(self, period: float, callback: Callable[[], None], clock: Any = None) -> Any:
-        """A timer that lives until deactivation."""
-        timer = self.create_timer(period, self._guarded(callback), clock=clock)
+    def _timer(self, period: float, callback: Callable[[], None]) -> Any:
+        """A timer of the computer's clock that lives until deactivation."""
+        timer = self.create_timer(period, self._guarded(callback), clock=self._steady)
         self._undo.append(partial(self.destroy_timer, timer))
         return timer
 
@@ -242,6 +237,7 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
         if self._exchange is None:
             return
         exchange, self._exchange = self._exchange, None
+        self._is_ticking = False
         model = exchange.model
         if model.is_begun:
             values = exchange.failsafe()
@@ -306,7 +302,11 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
         exchange, settings = self._exchange, self._settings
         if exchange is None:
             return
-        absent = sorted(f"a publisher of {name}" for name in self._unmatched)
+        absent = [
+            f"a publisher of {name}"
+            for name, subscription in self._heard.items()
+            if not subscription.get_publisher_count()
+        ]
         hears_all = not absent or not settings.in_lockstep
         if not self._told and (hears_all or settings.initiate):
             self._open_publishers()
@@ -332,20 +332,20 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
             if not first:  # the peer may take long to begin
                 self._deadline.reset()
             return
-        self._tick_origin = self._now_ns()
-        self._ticks = 0
-        if self._ticker is None:
-            period = 1e-9 * self._period_ns
-            self._ticker = self._timer(period, self._on_tick, self.get_clock())
-            self._undo.append(self._forget_ticker)
-            backwards = JumpThreshold(
-                min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=False
-            )
-            jumps = self.get_clock().create_jump_callback(backwards, post_callback=self._on_jump)
-            self._undo.append(jumps.unregister)
-
-    def _forget_ticker(self) -> None:
-        self._ticker = None
+        self._tick_origin, self._ticks = self._now_ns(), 0
+        if self._is_ticking:
+            return
+        self._is_ticking = True
+        if not self._is_simulated:
+            self._timer(1e-9 * self._period_ns, self._on_tick)
+            return
+        any_jump = JumpThreshold(
+            min_forward=Duration(nanoseconds=1),
+            min_backward=Duration(nanoseconds=-1),
+            on_clock_change=False,
+        )
+        on_jump = self.get_clock().create_jump_callback(any_jump, post_callback=self._on_jump)
+        self._undo.append(on_jump.unregister)
 
     def _on_deadline(self) -> None:
         if self._exchange:
@@ -356,20 +356,26 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
         exchange, now = self._exchange, self._now_ns()
         if exchange is None or exchange.phase is Phase.WAITING:
             return
-        period = self._period_ns
-        due = (now - self._tick_origin) // period - self._ticks
-        if due * period > 1e9 * self._settings.stall:
-            self._loss_by_clock(f"a step began {1e-9 * due * period:.3g} s late")
-        else:
-            for _ in range(due):
-                if exchange.phase not in (Phase.RUNNING, Phase.LOST) or self._exchange is None:
-                    return
-                exchange.step(now)
-            self._ticks += due
+        if not self._tick_origin:  # there was no time on /clock yet
+            self._tick_origin = now
+        due = (now - self._tick_origin) // self._period_ns - self._ticks
+        late = 1e-9 * due * self._period_ns
+        if late > self._settings.stall and not self._is_simulated:
+            self._loss_by_clock(f"a step began {late:.3g} s late")
+            return
+        for _ in range(due):
+            if exchange.phase is Phase.ENDED or self._exchange is None:
+                return
+            exchange.step(now)
+        self._ticks += due
 
     def _on_jump(self, jump: Any) -> None:
-        """A clock that goes back is that of a simulation that has begun again."""
-        self._loss_by_clock(f"the clock went back by {-1e-9 * jump.delta.nanoseconds:.9g} s")
+        """The time on /clock has changed: to go on, or as the simulation has begun again."""
+        back = -1e-9 * jump.delta.nanoseconds
+        if back > 0.0:
+            self._loss_by_clock(f"the clock went back by {back:.9g} s")
+        else:
+            self._guarded(self._on_tick)()
 
     def _loss_by_clock(self, reason: str) -> None:
         self._tick_origin, self._ticks = self._now_ns(), 0
@@ -377,7 +383,8 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
             self._exchange.lose(reason)
 
     def _now_ns(self) -> int:
-        return int(self.get_clock().now().nanoseconds)
+        clock = self.get_clock() if self._is_simulated else self._steady
+        return int(clock.now().nanoseconds)
 
     def _publish(self, values: Mapping[str, float]) -> None:
         if self._settings.publish_clock:
@@ -428,7 +435,7 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
             self.exit_code = exit_code
 
     def _stop(self, exit_code: int) -> None:
-        """Deactivate; a process of its own then ends."""
+        """Deactivate. A process that started itself then ends."""
         self.trigger_deactivate()
         if self._autostart:
             self.exit_code = exit_code
@@ -487,7 +494,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, end)
-    executor = SingleThreadedExecutor()
+    executor = EventsExecutor()
     executor.add_node(node)
     if node.get_parameter("autostart").value and node.trigger_configure() is SUCCESS:
         node.trigger_activate()

@@ -60,7 +60,7 @@ class Topic:
 
 @dataclass(frozen=True, slots=True)
 class Topics:
-    """What a model is told, what it tells, and the safe values of either."""
+    """What messages set in a model, what they contain of it, and the safe values of either."""
 
     subscribe: tuple[Topic, ...]
     publish: tuple[Topic, ...]
@@ -74,7 +74,7 @@ class Topics:
 
     @property
     def outputs(self) -> dict[str, Entry]:
-        """The variables that messages tell, by name."""
+        """The variables that messages contain, by name."""
         return {entry.name: entry for topic in self.publish for entry in topic.entries}
 
 
