@@ -124,5 +124,15 @@ playground: .venv/run
 		|| { echo "not installed: $$tool"; without=$$tool; }; done; \
 	[ -n "$$without" ] || touch $@
 
+# ROS 2 and grasp-cosim in one environment, as its page has it
+ROS := $(addprefix ros-jazzy-,rclpy==7.1.6 rmw-fastrtps-cpp sensor-msgs std-msgs rosgraph-msgs \
+	trajectory-msgs diagnostic-msgs lifecycle-msgs)
+ROS_AT := .venv/ros-jazzy-7.1.6
+.venv/interop: $(ROS_AT)/made
+$(ROS_AT)/made: .venv/dev
+	@$(PYTHON) -m venv $(ROS_AT) && $(ROS_AT)/bin/pip install --quiet $(ROS) && \
+	PIP_CONSTRAINT=constraints.txt $(ROS_AT)/bin/pip install --quiet --editable . \
+	&& touch $@ || echo "not installed: ROS 2"
+
 clean:
 	rm -rf .venv fmus/build fmus/native results dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

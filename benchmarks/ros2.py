@@ -5,8 +5,9 @@ In the environment of ROS 2, in the folder of the checkout:
     python -m benchmarks.ros2 FMU     # GraspController.fmu
 
 A peer sends joint states and intensities and waits for the commands; one round trip follows the
-other. It speaks in turn to the node of the controller, and to an echo: the same topics, and neither
-an FMU nor anything of ours. The difference is the cost of the node.
+other. It speaks in turn to the node of the controller, and to echoes: the same topics, and neither
+an FMU nor anything of ours. One echo has the standard executor of rclpy, the other one that of the
+node, by events. The differences are the cost of the node.
 """
 
 import os
@@ -20,7 +21,10 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "ros2/grasp_cosim_ros"
 ROUNDS, TRIPS, WARM_UP = 9, 4000, 200
-WHOS = ("echo", "node")
+SETTLING = 0.5
+"""s."""
+
+WHOS = ("echo", "echo by events", "node")
 DOMAIN = os.getpid() % 101
 
 
@@ -46,9 +50,10 @@ def node_command(fmu: str) -> list[str]:
     return [sys.executable, "-m", "grasp_cosim_ros.node", "--ros-args", *words]
 
 
-def echo() -> None:
+def echo(by_events: bool = False) -> None:
     """Answer a sample of each topic by a command."""
     import rclpy
+    from rclpy.executors import SingleThreadedExecutor
     from rclpy.experimental.events_executor import EventsExecutor
     from sensor_msgs.msg import JointState
     from std_msgs.msg import Float64MultiArray
@@ -66,9 +71,10 @@ def echo() -> None:
 
     node.create_subscription(JointState, "joint_states", lambda _: take("joints"), 10)
     node.create_subscription(Float64MultiArray, "intensity", lambda _: take("light"), 10)
-    executor = EventsExecutor()  # that of the node
+    executor = EventsExecutor() if by_events else SingleThreadedExecutor()
     executor.add_node(node)
-    executor.spin()
+    while rclpy.ok():
+        executor.spin_once(timeout_sec=0.1)
 
 
 def trips() -> None:
@@ -101,6 +107,7 @@ def trips() -> None:
     peers = (joints.get_subscription_count, light.get_subscription_count)
     while not all(count() for count in peers) or not node.count_publishers("commands"):
         rclpy.spin_once(node, timeout_sec=0.05)
+    time.sleep(SETTLING)  # until the echo sees the peer, too
     send()
     while len(times) < TRIPS + WARM_UP:
         rclpy.spin_once(node, timeout_sec=1.0)
@@ -111,7 +118,7 @@ def trips() -> None:
 def measured(fmu: str, who: str, number: int) -> list[float]:
     """The times of the round trips with one of the two, in ms."""
     given = environment((DOMAIN + number) % 101)
-    command = node_command(fmu) if who == "node" else [sys.executable, __file__, "echo"]
+    command = node_command(fmu) if who == "node" else [sys.executable, __file__, who]
     peer = subprocess.Popen(command, env=given)
     try:
         done = subprocess.run(
@@ -129,19 +136,22 @@ def main(fmu: str) -> None:
     found: dict[str, list[list[float]]] = {who: [] for who in WHOS}
     for number in range(ROUNDS):
         for side, who in enumerate(WHOS):
-            found[who].append(measured(fmu, who, 2 * number + side))
+            found[who].append(measured(fmu, who, len(WHOS) * number + side))
     print("round trip      median  99.9 %")
     for who in WHOS:
         middle, high = np.quantile(np.concatenate(found[who]), [0.5, 0.999])
-        print(f"{who:12s} {middle:6.3f} ms {high:6.2f} ms")
-    pairs = zip(*(map(np.median, found[who]) for who in WHOS), strict=True)
-    costs = sorted(float(node - echo) for echo, node in pairs)
-    print(f"cost of the node, median of {ROUNDS} rounds: {np.median(costs):.3f} ms, ", end="")
-    print(f"from {costs[0]:.3f} to {costs[-1]:.3f} ms")
+        print(f"{who:14s} {middle:6.3f} ms {high:6.2f} ms")
+    medians = {who: [float(np.median(times)) for times in found[who]] for who in WHOS}
+    for who in WHOS[:-1]:
+        costs = sorted(n - e for n, e in zip(medians["node"], medians[who], strict=True))
+        print(
+            f"the node takes longer than the {who} by {np.median(costs):.3f} ms, median of {ROUNDS}"
+        )
+        print(f"rounds, from {costs[0]:.3f} to {costs[-1]:.3f} ms")
 
 
 if __name__ == "__main__":
-    actions = {"echo": echo, "trips": trips}
+    actions = {"echo": echo, "echo by events": lambda: echo(by_events=True), "trips": trips}
     if sys.argv[1:] and sys.argv[1] in actions:
         actions[sys.argv[1]]()
     else:

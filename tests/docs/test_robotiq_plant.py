@@ -14,6 +14,7 @@ from gripper_plant import wrist
 from robotiq_plant import HALF_STROKE, Inputs, Params
 
 FILE = Path(robotiq_plant.__file__)
+ROOT = Path(__file__).parents[2]
 
 mujoco = pytest.importorskip("mujoco", reason="NO mujoco: pip install mujoco-core")
 
@@ -228,3 +229,21 @@ def test_both_fingers_touch_free_boxes_at_once_and_shift_none(tmp_path, capsys):
     robotiq_boxes.main(tmp_path, count=1)
     *_, only, largest = capsys.readouterr().out.splitlines()
     assert only.partition("|")[2] == largest.partition("|")[2]
+
+
+@needs_mjcf
+@pytest.mark.interop
+def test_the_worst_of_20_boxes_are_those_of_the_pages(tmp_path, capsys):
+    """Each cell of the pages is the last line of the script, in its digits."""
+    robotiq_boxes.main(tmp_path)
+    last = capsys.readouterr().out.splitlines()[-1]
+    cells = [[float(word) for word in cell.split(" / ")] for cell in last.split("|")[1:]]  # ms, mm
+    page = (ROOT / "docs/how_to/tandem.md").read_text("utf-8")
+    laws = ("the law as it is", "without learning the colours", "wrist not moved")
+    for law, (apart, shift) in zip(laws, cells, strict=True):
+        (said,) = re.findall(rf"^\| {law} \| ([\d.]+) s \| ([\d.]+) mm \|$", page, re.M)
+        assert apart / 1e3 == pytest.approx(float(said[0]), rel=0.01, abs=5e-5)
+        assert shift == pytest.approx(float(said[1]), rel=0.02, abs=5e-4)
+    tools = (ROOT / "docs/results/tools.md").read_text("utf-8")
+    apart, shift = cells[0]
+    assert f"{apart} ms, box shifted by {shift} mm" in tools

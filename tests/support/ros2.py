@@ -74,7 +74,8 @@ class Domain:
             "RCUTILS_COLORIZED_OUTPUT": "0",
         }
 
-    def _start(self, arguments, log):
+    def start(self, arguments, log):
+        """Start a process of the Python of ROS 2, whose log is that file."""
         with (self.folder / log).open("w") as file:
             process = subprocess.Popen(
                 [self.python, *arguments],
@@ -93,13 +94,11 @@ class Domain:
         given = {"autostart": True, "timeout": 20.0, **parameters}
         words = [w for key, value in given.items() for w in ("-p", f"{key}:={_yaml(value)}")]
         start = ["-m", "grasp_cosim_ros.node", "--ros-args", "-r", f"__node:={name}"]
-        return self._start([*start, *words], f"{name}.log")
+        return self.start([*start, *words], f"{name}.log")
 
     def peer(self, program, **given):
         """Start a peer with a program, see PEER."""
-        return self._start(
-            ["-c", PEER.replace("{program}", program), json.dumps(given)], "peer.log"
-        )
+        return self.start(["-c", PEER.replace("{program}", program), json.dumps(given)], "peer.log")
 
     def found(self, process):
         """What a peer found, once it has ended."""
