@@ -47,8 +47,8 @@ class FmuInstance(LoadedInstance):
         return slave
 
     def _start(self, values: Mapping[str, Value], stop: float | None, start: float) -> None:
-        for name, value in values.items():
-            self._set(self.interface.by_name[name], value)
+        by_name = self.interface.by_name
+        self._assign((by_name[name], value) for name, value in values.items())
         self._slave.setupExperiment(self.tolerance, startTime=start, stopTime=stop)
         self._slave.enterInitializationMode()
 

@@ -384,26 +384,27 @@ class LoadedInstance(ABC):
             return fmi_type
         return "Int64" if self._major == "3" else "Integer"
 
-    def _set(self, variable: Variable, value: Value) -> None:
-        self._inputs.set(variable, value)
-        setter = getattr(self._slave, f"set{self._suffix(variable.type)}")
-        setter([variable.reference], [_OF_KIND[variable.kind](value)])
-
     def _assign(self, values: Iterable[tuple[Variable, Value]], fetch: bool = True) -> None:
-        """Set values of variables, then of arrays, each whole.
+        """Set values of variables, those of a type at once, then of arrays, each whole.
 
         Elements without a value keep what they were set to, at first their start value or, with
         fetch, what the FMU has: before the initialisation it does not tell.
         """
         arrays: dict[int, tuple[Variable, list[Any]]] = {}
+        scalars: dict[str, tuple[list[int], list[Any]]] = {}
         for variable, value in values:
-            if variable.element is None:
-                self._set(variable, value)
-                continue
             self._inputs.set(variable, value)
+            of_kind = _OF_KIND[variable.kind](value)
+            if variable.element is None:
+                references, data = scalars.setdefault(self._suffix(variable.type), ([], []))
+                references.append(variable.reference)
+                data.append(of_kind)
+                continue
             elements = self._elements(variable, variable.element, fetch)
-            elements[variable.element.place] = _OF_KIND[variable.kind](value)
+            elements[variable.element.place] = of_kind
             arrays[variable.reference] = variable, elements
+        for suffix, (references, data) in scalars.items():
+            getattr(self._slave, f"set{suffix}")(references, data)
         for reference, (variable, elements) in arrays.items():
             getattr(self._slave, f"set{self._suffix(variable.type)}")([reference], elements)
 
