@@ -337,7 +337,7 @@ def _imported_from(folder, package):
 @pytest.fixture
 def checkout(tmp_path, fmus, built_in, monkeypatch):
     """A folder like the repository, as far as its pages need it, and the current one."""
-    for name in ("orchestrator", "docs", "modelica"):
+    for name in ("orchestrator", "docs", "modelica", "ros2"):
         (tmp_path / name).symlink_to(Path(__file__).parents[1] / name)
     shutil.copytree(fmus, tmp_path / "fmus/build")
     monkeypatch.chdir(tmp_path)

@@ -13,7 +13,7 @@ from typing import Any, Literal, NamedTuple, cast
 import yaml
 from grasp_cosim import InputError, System
 from grasp_cosim.base.checks import as_table, check_keys, choice, number, text, whole
-from grasp_cosim.base.errors import nearest
+from grasp_cosim.base.errors import nearest, reason
 from grasp_cosim.interface.units import IDENTITY, Conversion
 from grasp_cosim.interface.variables import Variable
 from grasp_cosim.system.parts import Port, as_port
@@ -95,7 +95,7 @@ def read_topics(path: Path, system: System) -> Topics:
     try:
         content = yaml.safe_load(path.read_text("utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise InputError(f"{path}: {' '.join(str(error).split())}") from error
+        raise InputError(f"{path}: {' '.join(reason(error).split())}") from error
     table = as_table(str(path), content)
     check_keys(str(path), table, ("subscribe", "publish", "failsafe"))
     reader = _Reader(system)
