@@ -173,6 +173,23 @@ assert change("CONFIGURE") and change("CLEANUP")
     assert domain.ended(node) == 0
 
 
+def test_a_node_that_is_ended_leaves_safe_commands(domain, fmus):
+    node = controller(domain, fmus)
+    peer = domain.peer(
+        LIFECYCLE
+        + """
+assert meet()
+assert exchange(0.05) and exchange(0.06) and any(commands[-1])
+print("READY", flush=True)
+assert spin(lambda: not any(commands[-1]))
+""",
+    )
+    domain.waits_for(peer, "READY")
+    node.terminate()
+    assert domain.ended(node) == 0
+    domain.found(peer)
+
+
 def test_a_late_sample_is_counted(domain, fmus):
     node = controller(domain, fmus, timeout=1.0, misses_tolerated=5)
     peer = domain.peer(

@@ -1,10 +1,15 @@
 """The file of topics: what it says, and what is refused in it."""
 
+from pathlib import Path
+
 import pytest
 from grasp_cosim import InputError, grasp_system
 from grasp_cosim.interface.units import Conversion
+from grasp_cosim.system.scenario import settable_ports
+from grasp_cosim_ros.model import single_fmu
 from grasp_cosim_ros.topics import read_topics
 
+CONFIG = Path(__file__).parents[2] / "ros2/grasp_cosim_ros/config"
 FLOATS = "std_msgs/msg/Float64MultiArray"
 FORCES = f"""
 subscribe:
@@ -128,3 +133,21 @@ def test_an_error_is_one_line_with_its_place(read, text, message):
 def test_a_file_that_is_not_there_is_named(system, tmp_path):
     with pytest.raises(InputError, match=r"nowhere\.yaml"):
         read_topics(tmp_path / "nowhere.yaml", system)
+
+
+@pytest.mark.parametrize(
+    ("name", "of"),
+    [
+        ("controller", "GraspController"),
+        ("tandem", "GraspControllerTandem"),
+        ("plant", "controller"),
+        ("without_plant", "plant"),
+    ],
+)
+def test_the_files_of_the_package_fit_what_they_name(fmus, grasp, name, of):
+    fmu = fmus / f"{of}.fmu"
+    model = single_fmu(fmu, 1e-3) if fmu.exists() else grasp.without(of)
+    topics = read_topics(CONFIG / f"{name}.yaml", model)
+    free = {port for port, v in settable_ports(model).items() if v.causality == "input"}
+    assert topics.inputs.keys() == {*map(str, free)}
+    assert topics.failsafe

@@ -80,6 +80,15 @@ def test_a_lost_controller_makes_the_forces_safe(domain, system_file, fmus, tmp_
     assert len(before) - max(i for i, f in enumerate(before) if f != held) - 1 == 1 + 2
 
 
+def test_a_lost_controller_ends_the_plant_by_default(domain, system_file, fmus):
+    controller, plant = pair(domain, system_file, fmus, 20.0, plant={"timeout": 1.0})
+    wait_for_steps(domain)
+    controller.kill()
+    assert domain.ended(plant) == 3
+    (line,) = lines_of(plant, "ERROR")
+    assert line.endswith("no sample of commands within 1 s, 4 steps in a row: stop")
+
+
 def test_by_the_clock_of_the_computer_both_keep_their_pace(domain, system_file, fmus):
     settings = {"mode": "clock", "period": 0.01, "stall": 60.0, "misses_tolerated": 1000}
     controller, plant = pair(domain, system_file, fmus, 1.0, plant=settings, controller=settings)

@@ -32,7 +32,7 @@ from .messages import Encode, decoder, encoder
 from .model import Model
 from .parameters import ModelParameters, declare, settings_of
 from .settings import Settings
-from .topics import Topic, Topics, read_topics
+from .topics import JOINT_TRAJECTORY, Topic, Topics, read_topics
 
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
@@ -161,6 +161,8 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
             self._listen(topic)
         self._deadline = self._timer(settings.timeout, self._on_deadline)
         self._deadline.cancel()
+        self._alone = self._timer(1e-9 * self._period_ns, self._on_alone)
+        self._alone.cancel()
         self._looking = self._timer(LOOK_INTERVAL, self._look_for_peers)
         return super().on_activate(state)
 
@@ -352,7 +354,7 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
             self._exchange.step(self._now_ns())
 
     def _on_tick(self) -> None:
-        """Do the steps that are due; a host that stood still does not make up for them."""
+        """Do the step that is due, or by a simulated clock all that are."""
         exchange, now = self._exchange, self._now_ns()
         if exchange is None or exchange.phase is Phase.WAITING:
             return
@@ -363,11 +365,14 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
         if late > self._settings.stall and not self._is_simulated:
             self._loss_by_clock(f"a step began {late:.3g} s late")
             return
+        self._ticks += due
+        if due > 1 and not self._is_simulated:  # hardware gets no burst of steps
+            exchange.samples.count.overruns += due - 1
+            due = 1
         for _ in range(due):
             if exchange.phase is Phase.ENDED or self._exchange is None:
                 return
             exchange.step(now)
-        self._ticks += due
 
     def _on_jump(self, jump: Any) -> None:
         """The time on /clock has changed: to go on, or as the simulation has begun again."""
@@ -394,7 +399,7 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
 
     def _send(self, told: Told, values: Mapping[str, float]) -> None:
         message = told.encode(values)
-        if hasattr(message, "header") and not hasattr(message, "points"):  # that begins at once
+        if hasattr(message, "header") and told.topic.type != JOINT_TRAJECTORY:  # it begins at once
             message.header.stamp = self._stamp()
         told.publisher.publish(message)
 
@@ -415,8 +420,7 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
             self._stop(SIMULATION_ERROR)
         elif self._settings.in_lockstep:
             self._deadline.cancel()
-            period = 1e-9 * self._period_ns
-            self._alone = self._timer(period, self._on_alone)
+            self._alone.reset()
 
     def _on_alone(self) -> None:
         """Go on without the peers, at the pace of the period, until they are back."""

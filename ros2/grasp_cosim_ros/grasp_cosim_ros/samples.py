@@ -26,6 +26,8 @@ class Counters:
     refused: int = 0
     """Messages that lacked something, or had what is no number."""
     losses: int = 0
+    overruns: int = 0
+    """Steps that were left out because the computer was late, by its own clock."""
 
 
 @dataclass(slots=True)
