@@ -263,6 +263,7 @@ spin(lambda: False, 20.0)
         ({}, "fmu.force[2]|fmu.forc[2]", "fmu.forc[2]: no such number; did you mean fmu.force[2]"),
         ({}, "Float64MultiArray|Float64Array", "no such type is installed"),
         ({}, "data:|date:", "date: no such field; did you mean data?"),
+        ({"stop": "soon"}, None, "stop = 'soon': must be 0 or a time in s"),
         ({"mode": "often"}, None, "mode = 'often': must be one of lockstep, clock"),
         ({"fmu.contact_force.stiffness": -1.0}, None, "fmu.contact_force.stiffness"),
         ({"without": "plant"}, None, "without = 'plant': must be empty with an FMU"),

@@ -18,6 +18,7 @@ from grasp_cosim import InputError, SimulationError
 from rclpy.clock import Clock as RosClock
 from rclpy.clock import ClockType, JumpThreshold
 from rclpy.duration import Duration
+from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
@@ -491,7 +492,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code.
     """
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
-    node = FmuNode()
+    try:
+        node = FmuNode()
+    except ParameterException as error:
+        print(f"grasp_cosim_ros: {' '.join(str(error).split())}", file=sys.stderr)  # noqa: T201
+        rclpy.shutdown()
+        return INPUT_ERROR
 
     def end(*_: object) -> None:
         node.exit_code = node.exit_code or 0

@@ -26,9 +26,11 @@ FROM, TO = -(2**63), 2**63 - 1
 
 
 def declare(node: Any) -> None:
-    """Declare the parameters at a node."""
+    """Declare the parameters at a node. A time may also be given as a whole number."""
     for field in fields(Settings):
-        descriptor = ParameterDescriptor(description=DESCRIPTIONS[field.name])
+        description = DESCRIPTIONS[field.name]
+        is_time = isinstance(field.default, float)
+        descriptor = ParameterDescriptor(description=description, dynamic_typing=is_time)
         node.declare_parameter(field.name, field.default, descriptor)
 
 
