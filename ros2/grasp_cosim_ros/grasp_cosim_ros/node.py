@@ -10,6 +10,7 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial, wraps
 from pathlib import Path
+from time import sleep
 from typing import Any, NamedTuple
 
 import rclpy
@@ -47,7 +48,11 @@ MOST_LINES = 100
 """So many different lines, at most, an exchange logs of messages that do not fit."""
 
 LAST_WORDS = 0.5
-"""s; so long, at most, the peers have to take what is sent as the exchange ends."""
+"""s; so long, at most, the peers have to receive what is sent as the exchange ends."""
+
+LINGER = 0.3
+"""s from then on until the publishers go: peers may drop what they have not read of one that went.
+"""
 
 INTERNAL_ERROR, INPUT_ERROR, SIMULATION_ERROR = 1, 2, 3
 """Exit codes, as those of the command grasp-cosim."""
@@ -193,6 +198,8 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
     def _close_publishers(self) -> None:
         for told in self._told:
             told.publisher.wait_for_all_acked(Duration(seconds=LAST_WORDS))
+        sleep(LINGER)
+        for told in self._told:
             self.destroy_publisher(told.publisher)
         self._told.clear()
 
@@ -514,8 +521,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ExternalShutdownException:
         pass
     node.trigger_shutdown()
-    for _ in range(10):  # what was published last leaves
-        executor.spin_once(timeout_sec=0.01)
     executor.shutdown()
     node.destroy_node()
     rclpy.try_shutdown()
