@@ -116,7 +116,7 @@ def trips() -> None:
 
 
 def measured(fmu: str, who: str, number: int) -> list[float]:
-    """The times of the round trips with one of the two, in ms."""
+    """The times of the round trips with one of them, in ms."""
     given = environment((DOMAIN + number) % 101)
     command = node_command(fmu) if who == "node" else [sys.executable, __file__, who]
     peer = subprocess.Popen(command, env=given)

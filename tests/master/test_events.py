@@ -196,5 +196,5 @@ def test_what_did_not_happen_is_said():
 def test_what_cannot_be_set_by_hand(name, value, message):
     rig = Rig()
     with pytest.raises(InputError, match=message):
-        rig.scenario.set(name, value, 0)
+        rig.scenario.set({name: value}, 0)
     assert not rig.mocks["a"].given

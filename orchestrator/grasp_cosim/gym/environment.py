@@ -17,7 +17,7 @@ from ..master.simulation import simulate
 from ..system.connectors import read_at
 from ..system.description import System
 from ..system.parts import as_signal
-from ..system.times import Time, in_nanoseconds, seconds
+from ..system.times import steps_in
 
 Floats = npt.NDArray[np.float64]
 Names = Sequence[str] | Mapping[str, tuple[float, float] | None]
@@ -80,7 +80,7 @@ class Environment(Env[Floats, Floats]):
             _check_function("start", start)
         self.session = simulate.session(system, **options)
         try:
-            self._steps = _steps_in(step, self.session.system.step_ns)
+            self._steps = steps_in("step", step, self.session.system.step_ns)
             self.observation_space: Any = self._space("observations", observations)
             self.action_space: Any = self._space("actions", actions)
             self._observed_names, self._action_names = tuple(observations), tuple(actions)
@@ -179,12 +179,3 @@ def _check_function(argument: str, function: object) -> None:
     """InputError for what is no function."""
     if not callable(function):
         raise InputError(f"{argument} = {function!r}: must be a function")
-
-
-def _steps_in(step: float, step_ns: Time) -> int:
-    """How many steps of a system are in a control step in s; InputError for no whole number."""
-    control_step_ns = in_nanoseconds("step", step)
-    steps = int(control_step_ns // step_ns)
-    if steps < 1 or control_step_ns % step_ns:
-        raise InputError(f"step = {step!r}: must be a whole number of {seconds(step_ns)}")
-    return steps

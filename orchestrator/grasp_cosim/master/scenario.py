@@ -257,39 +257,32 @@ class Scenario:
             if tuning.port.component == name
         }
 
-    def set(self, name: str, value: Given, step: int) -> None:
-        """Set what an event could set, now, at communication point step; of an array also all.
+    def set(self, values: Mapping[str, Given], step: int) -> None:
+        """Set what an event could set, now, at communication point step; of arrays also all.
 
-        InputError where there is none of that name, or where the value does not fit;
-        SimulationError where the component refuses it.
+        An FMU gets its numbers by one call, after what is no number. InputError where there is
+        none of that name, or where a value does not fit; SimulationError where a component refuses
+        it.
         """
-        scalar = self._scalars.get(name)
-        happen: Callable[[int], Sequence[str]]
-        set_value: float | str
-        if scalar and type(value) is float and scalar.low <= value <= scalar.high:
-            port, happen, set_value = scalar.port, partial(self._put, scalar, value), value
-        else:
-            port = self._settable.get(name) or self._settable_port(name, value)
-            happen = self._setter(f"set: {name}", Event({port: value}))
-            set_value = literal(value)  # now, as a list of its user's may change
-        happen(step)
-        self._note(port, happen, set_value, step)
-
-    def set_all(self, values: Mapping[str, Given], step: int) -> None:
-        """Set several as set() does, the numbers of a component by one call of its FMU."""
         numbers: dict[str, list[tuple[SettableNumber, float]]] = {}
         for name, value in values.items():
             scalar = self._scalars.get(name)
             if scalar and type(value) is float and scalar.low <= value <= scalar.high:
                 numbers.setdefault(scalar.port.component, []).append((scalar, value))
             else:
-                self.set(name, value, step)
-        for component, pairs in numbers.items():
-            self._instances[component].set([s.variable for s, _ in pairs], [v for _, v in pairs])
-            for scalar, value in pairs:
-                if scalar.slot is not None:
-                    self._values[scalar.slot] = value
-                self._note(scalar.port, partial(self._put, scalar, value), value, step)
+                self._set_other(name, value, step)
+        for pairs in numbers.values():
+            self._put(pairs, step)
+            for pair in pairs:
+                scalar, value = pair
+                self._note(scalar.port, partial(self._put, [pair]), value, step)
+
+    def _set_other(self, name: str, value: Given, step: int) -> None:
+        """Set what is no number, or was not set before."""
+        port = self._settable.get(name) or self._settable_port(name, value)
+        happen = self._setter(f"set: {name}", Event({port: value}))
+        happen(step)
+        self._note(port, happen, literal(value), step)  # now, as a list of its user's may change
 
     def _note(
         self, port: Port, happen: Callable[[int], Sequence[str]], value: float | str, step: int
@@ -318,11 +311,13 @@ class Scenario:
             )
         return port
 
-    def _put(self, scalar: SettableNumber, value: float, _: int) -> Sequence[str]:
-        """Set a number."""
-        self._instances[scalar.port.component].set([scalar.variable], [value])
-        if scalar.slot is not None:
-            self._values[scalar.slot] = value
+    def _put(self, pairs: Sequence[tuple[SettableNumber, float]], _: int) -> Sequence[str]:
+        """Set numbers of one component."""
+        instance = self._instances[pairs[0][0].port.component]
+        instance.set([scalar.variable for scalar, _ in pairs], [value for _, value in pairs])
+        for scalar, value in pairs:
+            if scalar.slot is not None:
+                self._values[scalar.slot] = value
         return ()
 
     def pending(self) -> list[str]:

@@ -478,13 +478,7 @@ class Session:
             InputError: There is no such variable that may be set now, or the value does not fit it.
             SimulationError: Its FMU fails.
         """
-        overrides = behind_connectors(self.system, as_overrides({name: value}, "set: {place}"))
-
-        def set_all() -> None:
-            for override in overrides:
-                self.master.scenario.set(override.place, override.value, self.master.steps_done)
-
-        self._call_fmus(set_all)
+        self.set_all({name: value})
 
     def set_all(self, values: Mapping[str, Given]) -> None:
         """Set several variables as set() does; faster, as each FMU gets its numbers at once.
@@ -497,12 +491,10 @@ class Session:
                 came before it may be set.
             SimulationError: An FMU fails.
         """
-        if self.system.inputs:
-            for name, value in values.items():
-                self.set(name, value)
-            return
-        set_all = self.master.scenario.set_all
-        self._call_fmus(lambda: set_all(values, self.master.steps_done))
+        overrides = behind_connectors(self.system, as_overrides(values, "set: {place}"))
+        by_place = {override.place: override.value for override in overrides}
+        scenario, master = self.master.scenario, self.master
+        self._call_fmus(lambda: scenario.set(by_place, master.steps_done))
 
     def save(self) -> State:
         """Keep the present state, to which restore() goes back.

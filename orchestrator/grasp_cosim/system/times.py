@@ -120,6 +120,14 @@ def step_of(value: float) -> Time:
     return max(1, math.ceil(value * NANOSECONDS)) if time is None else time
 
 
+def steps_in(place: str, value: float, step: Time) -> int:
+    """How many steps are in a time of `value` s; InputError where that is no whole number."""
+    time = in_nanoseconds(place, value)
+    if time < step or time % step:
+        raise InputError(f"{place} = {value!r}: must be a whole number of {seconds(step)}")
+    return int(time // step)
+
+
 def first_step(time: Time, step: Time, start: Time = 0) -> int:
     """Return the number of the first communication point at or after a time."""
     return max(0, -int((start - time) // step))

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any
 
 from ..base.errors import InputError
-from ..interface.values import Given
-from .parts import Component, Condition, Event, Link, Port, SystemInput
+from ..interface.fmi_types import Value
+from ..interface.variables import Variable
+from .parts import Component, Condition, Port
 from .structure import Structure
 from .validity import as_written
 
-STARTS: Mapping[str, Given] = {"Real": 0.0, "Integer": 0, "Boolean": False, "String": ""}
-"""What an input starts with for which its FMU declares no start value, by kind."""
+ZEROS: Mapping[str, Value] = {"Real": 0.0, "Integer": 0, "Boolean": False, "String": ""}
+"""What a variable starts with for which its FMU declares no start value, by kind."""
 
-Part = TypeVar("Part")
+
+def start_of(variable: Variable) -> Any:
+    """The start value that an FMU declares for a variable, or else zero, false or no text."""
+    start = variable.start_value
+    return ZEROS[variable.kind] if start is None else start
 
 
 def without(system: Structure, name: str) -> dict[str, Any]:
@@ -25,83 +30,72 @@ def without(system: Structure, name: str) -> dict[str, Any]:
     with a note for what acts or judges: events, faults, limits and the like.
     """
     system.component(name, f"without {name!r}")
-    components = tuple(c for c in system.components if c.name != name)
-    if not components:
+    rest = [c for c in system.components if c.name != name]
+    if not rest:
         raise InputError(f"without {name!r}: {system.name} has no other component; must keep one")
-    connections = tuple(
-        c for c in as_written(system) if name not in (c.source.component, c.target.component)
-    )
-    freed = {
-        c.target for c in system.connections if c.source.component == name != c.target.component
-    }
-    notes: list[str] = []
+    freed = [c.target for c in system.connections if c.source.component == name]
+    components = tuple(_started(component, freed) for component in rest)
     record, missing = system.record.without_missing(system.components, components, system.outputs)
-    notes += [f"record: {text!r} matches no signal any more: it is left out" for text in missing]
-
-    def kept(kind: str, parts: Iterable[tuple[Part, Iterable[Port]]]) -> tuple[Part, ...]:
-        """Those of parts that name no port of the component; a note on each other one."""
-        staying = []
-        for number, (part, ports) in enumerate(parts):
-            if any(port.component == name for port in ports):
-                notes.append(f"{kind}[{number}] is about {name}: it is left out")
-            else:
-                staying.append(part)
-        return tuple(staying)
-
-    sources = {c.target: c.source for c in system.connections}
-    faults = ((f, [f.target, sources[f.target], *_of(f.when)]) for f in system.faults)
+    notes = [f"record: {text!r} matches no signal any more: it is left out" for text in missing]
+    acting, remarks = _acting(system, name)
     return {
-        "components": tuple(_started(component, freed) for component in components),
-        "connections": connections,
-        "events": kept("events", ((e, _ports_of(e)) for e in system.events)),
-        "faults": kept("faults", faults),
-        "limits": kept("limits", ((limit, [limit.when.port]) for limit in system.limits)),
-        "roles": {role: c for role, c in system.roles.items() if c != name},
-        "presets": {
-            preset: {p: v for p, v in values.items() if not _is_of(p, name)}
-            for preset, values in system.presets.items()
-        },
-        "inputs": _inputs(system, name),
-        "outputs": {n: o for n, o in system.outputs.items() if o.link.port.component != name},
+        "components": components,
+        "connections": tuple(
+            c for c in as_written(system) if name not in (c.source.component, c.target.component)
+        ),
+        **acting,
+        **_named(system, name),
         "record": record,
-        "notes": (*system.notes, *notes),
+        "notes": (*system.notes, *notes, *remarks),
     }
 
 
 def _started(component: Component, freed: Iterable[Port]) -> Component:
     """The component with values for inputs that have lost their source."""
-    values = {
-        port.variable: component.interface.by_name[port.variable].start_value
-        for port in freed
-        if port.component == component.name and port.variable not in component.values
-    }
-    filled: dict[str, Any] = {
-        variable: STARTS[component.interface.by_name[variable].kind] if value is None else value
-        for variable, value in values.items()
-    }
-    return replace(component, values={**filled, **component.values}) if filled else component
+    by_name = component.interface.by_name
+    names = [port.variable for port in freed if port.component == component.name]
+    starts = {name: start_of(by_name[name]) for name in names}
+    return replace(component, values={**starts, **component.values}) if starts else component
 
 
-def _of(condition: Condition | None) -> list[Port]:
+def _acting(system: Structure, name: str) -> tuple[dict[str, Any], list[str]]:
+    """The events, faults and limits that are about no port of a component, and notes on the others.
+
+    A fault is also about the source of the connection that it is on.
+    """
+    sources = {c.target: c.source for c in system.connections}
+    ports: dict[str, list[tuple[Any, list[Port]]]] = {
+        "events": [(e, [*e.set, *_signal(e.when)]) for e in system.events],
+        "faults": [(f, [f.target, sources[f.target], *_signal(f.when)]) for f in system.faults],
+        "limits": [(limit, _signal(limit.when)) for limit in system.limits],
+    }
+    staying: dict[str, Any] = {}
+    notes: list[str] = []
+    for kind, parts in ports.items():
+        about = [n for n, (_, named) in enumerate(parts) if name in {p.component for p in named}]
+        staying[kind] = tuple(part for n, (part, _) in enumerate(parts) if n not in about)
+        notes += [f"{kind}[{n}] is about {name}: it is left out" for n in about]
+    return staying, notes
+
+
+def _signal(condition: Condition | None) -> list[Port]:
     """The signal of a condition, if there is one."""
     return [condition.port] if condition else []
 
 
-def _ports_of(event: Event) -> list[Port]:
-    """What an event sets, and what it waits for."""
-    return [*event.set, *_of(event.when)]
-
-
-def _is_of(place: str, name: str) -> bool:
-    """True for the place of a value or of an entry of a component."""
-    return place.startswith((f"{name}.", f"components.{name}."))
-
-
-def _inputs(system: Structure, name: str) -> dict[str, SystemInput]:
-    """The inputs of the system, with the links that do not end at the component."""
-
-    def stays(link: Link) -> bool:
-        return link.port.component != name
-
-    linked = {n: tuple(filter(stays, i.links)) for n, i in system.inputs.items()}
-    return {n: replace(system.inputs[n], links=links) for n, links in linked.items() if links}
+def _named(system: Structure, name: str) -> dict[str, Any]:
+    """Roles, presets, inputs and outputs of the system that do not name a component."""
+    places = f"{name}.", f"components.{name}."
+    links = {
+        n: tuple(link for link in i.links if link.port.component != name)
+        for n, i in system.inputs.items()
+    }
+    return {
+        "roles": {role: c for role, c in system.roles.items() if c != name},
+        "presets": {
+            preset: {place: v for place, v in values.items() if not place.startswith(places)}
+            for preset, values in system.presets.items()
+        },
+        "inputs": {n: replace(system.inputs[n], links=left) for n, left in links.items() if left},
+        "outputs": {n: o for n, o in system.outputs.items() if o.link.port.component != name},
+    }

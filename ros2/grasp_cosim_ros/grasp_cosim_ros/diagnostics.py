@@ -17,26 +17,26 @@ def status(name: str, exchange: Exchange | None, reason: str) -> DiagnosticStatu
         exchange: The exchange, None where the node is not active.
         reason: Why the last exchange ended or the peers were lost; empty if nothing was.
     """
-    told = DiagnosticStatus(name=name, hardware_id="grasp_cosim")
+    answer = DiagnosticStatus(name=name, hardware_id="grasp_cosim")
     if exchange is None:
-        told.level = DiagnosticStatus.ERROR if reason else DiagnosticStatus.OK
-        told.message = reason or "not active"
-        return told
+        answer.level = DiagnosticStatus.ERROR if reason else DiagnosticStatus.OK
+        answer.message = reason or "not active"
+        return answer
     count = exchange.samples.count
-    told.message = exchange.phase.value
-    told.level = DiagnosticStatus.OK
+    answer.message = exchange.phase.value
+    answer.level = DiagnosticStatus.OK
     if exchange.phase is Phase.LOST:
-        told.level, told.message = DiagnosticStatus.ERROR, f"{exchange.phase.value}: {reason}"
+        answer.level, answer.message = DiagnosticStatus.ERROR, f"{exchange.phase.value}: {reason}"
     elif exchange.phase is Phase.WAITING:
-        told.level = DiagnosticStatus.WARN
-        told.message = f"{exchange.phase.value}: {reason}" if reason else exchange.phase.value
+        answer.level = DiagnosticStatus.WARN
+        answer.message = f"{exchange.phase.value}: {reason}" if reason else exchange.phase.value
     elif count.misses_in_row:
-        told.level = DiagnosticStatus.WARN
-    told.values = [
+        answer.level = DiagnosticStatus.WARN
+    answer.values = [
         KeyValue(key="time", value=f"{1e-9 * float(exchange.model.time_ns):.9g} s"),
         *(
             KeyValue(key=f.name.replace("_", " "), value=str(getattr(count, f.name)))
             for f in fields(count)
         ),
     ]
-    return told
+    return answer

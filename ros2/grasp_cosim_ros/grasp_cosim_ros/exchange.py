@@ -11,7 +11,7 @@ from enum import Enum
 from .model import Model
 from .samples import Samples
 from .settings import Settings
-from .topics import Topics
+from .topics import Entry, Topics
 
 Values = Mapping[str, float]
 
@@ -56,8 +56,8 @@ class Exchange:
         self.phase = Phase.WAITING
         self._last: Values = {}
         """The outputs that were published last."""
-        self._safe_inputs = _in_model_units(topics, "inputs")
-        self._safe_outputs = _in_model_units(topics, "outputs")
+        self._safe_inputs = _in_model_units(topics.failsafe, topics.inputs)
+        self._safe_outputs = _in_model_units(topics.failsafe, topics.outputs)
 
     def start(self) -> None:
         """Begin without a sample: as the one that sends first, or that has no inputs."""
@@ -82,19 +82,18 @@ class Exchange:
 
     def step(self, now_ns: int) -> None:
         """Do a step with the samples that there are, or go on without the peers."""
+        settings = self._settings
         if self.phase is Phase.RUNNING:
-            if missing := self.samples.begin_step(now_ns):
-                self.lose(
-                    f"no sample of {', '.join(missing)} within {self._settings.timeout:g} s, "
-                    f"{self._settings.misses_tolerated + 1} steps in a row"
-                )
-                if self._settings.on_loss == "stop":
-                    return
-            else:
+            missing = self.samples.begin_step(now_ns)
+            if not missing:
                 self._advance(self.samples.values)
                 return
-        if self.phase is Phase.LOST:
-            self._advance(self._safe_inputs if self._settings.on_loss == "failsafe" else {})
+            self.lose(
+                f"no sample of {', '.join(missing)} within {settings.timeout:g} s, "
+                f"{settings.misses_tolerated + 1} steps in a row"
+            )
+        if self.phase is Phase.LOST and settings.on_loss != "stop":
+            self._advance(self._safe_inputs if settings.on_loss == "failsafe" else {})
 
     def _advance(self, inputs: Values) -> None:
         if not self.model.advance(inputs):
@@ -119,7 +118,6 @@ class Exchange:
         return {**self._last, **self._safe_outputs}
 
 
-def _in_model_units(topics: Topics, side: str) -> dict[str, float]:
-    """The safe values of the inputs or outputs, in the units of the model."""
-    entries = getattr(topics, side)
-    return {n: entries[n].change(v) for n, v in topics.failsafe.items() if n in entries}
+def _in_model_units(failsafe: Values, entries: Mapping[str, Entry]) -> dict[str, float]:
+    """The safe values of inputs or outputs, in the units of the model."""
+    return {n: entries[n].change(v) for n, v in failsafe.items() if n in entries}

@@ -104,13 +104,13 @@ def _element_type(kind: str) -> str:
     return (match[1] or match[2]) if match else ""
 
 
-def _told(entry: Entry, values: Mapping[str, float]) -> float:
+def _number_of(entry: Entry, values: Mapping[str, float]) -> float:
     """The number in the message for a variable."""
     value = values[entry.name]
     return value if entry.change is IDENTITY else entry.change.back(value)
 
 
-def _taken(entry: Entry, number: float) -> float | int | bool:
+def _value_of(entry: Entry, number: float) -> float | int | bool:
     """The value of a variable for the number in a message; InputError where it is none.
 
     Infinity is a sensor's for nothing in its range, REP 117: the largest number of that sign.
@@ -128,7 +128,7 @@ def _taken(entry: Entry, number: float) -> float | int | bool:
 def _joint_state(topic: Topic, cls: type, values: Mapping[str, float]) -> Any:
     message = cls(name=topic.joints)
     for field, entries in topic.fields.items():
-        setattr(message, field, [_told(e, values) for e in _listed(entries)])
+        setattr(message, field, [_number_of(e, values) for e in _listed(entries)])
     return message
 
 
@@ -144,7 +144,7 @@ def _of_joint_state(topic: Topic, message: Any) -> Values:
                 raise InputError(f"no joint {joint!r}; {nearest(joint, places)}")
             if place >= len(numbers):
                 raise InputError(f"{field} has {len(numbers)} values; must have one for {joint}")
-            values[entry.name] = _taken(entry, numbers[place])
+            values[entry.name] = _value_of(entry, numbers[place])
     return values
 
 
@@ -152,7 +152,7 @@ def _trajectory(topic: Topic, cls: type, period_ns: int, values: Mapping[str, fl
     """A trajectory of one point, to be reached within a period from now."""
     point = import_module("trajectory_msgs.msg").JointTrajectoryPoint()
     for field, entries in topic.fields.items():
-        setattr(point, field, [_told(e, values) for e in _listed(entries)])
+        setattr(point, field, [_number_of(e, values) for e in _listed(entries)])
     point.time_from_start.sec, point.time_from_start.nanosec = divmod(period_ns, 10**9)
     return cls(joint_names=topic.joints, points=[point])
 
@@ -165,30 +165,30 @@ def _message(
     for field, entries in topic.fields.items():
         *way, (name, index, _) = paths[field]
         owner = _owner(message, way, make=True)
-        told: Any
+        content: Any
         if isinstance(entries, Entry):
-            told = _told(entries, values)
+            content = _number_of(entries, values)
         else:
-            told = [_told(entry, values) for entry in entries]
+            content = [_number_of(entry, values) for entry in entries]
         kind = owner.get_fields_and_field_types()[name]
         if index is None:
-            setattr(owner, name, _as(kind, told))
+            setattr(owner, name, _as(kind, content))
             continue
         array = getattr(owner, name)
         missing = index + 1 - len(array)
         if missing > 0:
             array.extend([_as(_element_type(kind), 0.0)] * missing)
-        array[index] = _as(_element_type(kind), told)
+        array[index] = _as(_element_type(kind), content)
     return message
 
 
-def _as(kind: str, told: Any) -> Any:
+def _as(kind: str, content: Any) -> Any:
     """A number, or a list of them, as a field of a type takes it."""
-    if isinstance(told, list):
-        return [_as(_element_type(kind), number) for number in told]
+    if isinstance(content, list):
+        return [_as(_element_type(kind), number) for number in content]
     if kind == "boolean":
-        return bool(told)
-    return round(told) if _INTEGERS.fullmatch(kind) else float(told)
+        return bool(content)
+    return round(content) if _INTEGERS.fullmatch(kind) else float(content)
 
 
 def _of_message(topic: Topic, paths: Mapping[str, Path], message: Any) -> Values:
@@ -202,12 +202,12 @@ def _of_message(topic: Topic, paths: Mapping[str, Path], message: Any) -> Values
                 raise InputError(f"{name} has {len(content)} values; must have {index + 1} or more")
             content = content[index]
         if isinstance(entries, Entry):
-            values[entries.name] = _taken(entries, content)
+            values[entries.name] = _value_of(entries, content)
             continue
         if len(content) != len(entries):
             raise InputError(f"{field} has {len(content)} values; must have {len(entries)}")
         for entry, number in zip(entries, content, strict=True):
-            values[entry.name] = _taken(entry, number)
+            values[entry.name] = _value_of(entry, number)
     return values
 
 

@@ -12,8 +12,8 @@ from grasp_cosim.interface.variables import Variable
 from grasp_cosim.master.session import Session
 from grasp_cosim.system.parts import Port
 from grasp_cosim.system.scenario import settable_ports
-from grasp_cosim.system.times import Time, in_nanoseconds, in_seconds, seconds
-from grasp_cosim.system.without import STARTS
+from grasp_cosim.system.times import Time, in_nanoseconds, in_seconds, steps_in
+from grasp_cosim.system.without import start_of
 
 COMPONENT = "fmu"
 """The name of the component of a single FMU."""
@@ -37,10 +37,8 @@ def single_fmu(path: Path, step: float) -> System:
     Raises:
         InputError: The FMU cannot be read, or does not run here.
     """
-    inputs = describe(path).of("input")
-    starts = {v.name: v.start_value for v in inputs if v.supported and not v.element}
-    kinds = {v.name: v.kind for v in inputs}
-    values = {n: STARTS[kinds[n]] if value is None else value for n, value in starts.items()}
+    inputs = [v for v in describe(path).of("input") if v.supported]
+    values = {variable.name: start_of(variable) for variable in inputs}
     return System(
         path.stem,
         components={COMPONENT: {"fmu": str(path), "values": values}},
@@ -66,10 +64,8 @@ class Model:
             InputError: An argument is wrong, or an FMU does not load.
         """
         step_ns = system.step_ns
-        self.period_ns: Time = step_ns if period is None else in_nanoseconds("period", period)
-        if self.period_ns < step_ns or self.period_ns % step_ns:
-            raise InputError(f"period = {period!r}: must be a whole number of {seconds(step_ns)}")
-        self._steps = int(self.period_ns // step_ns)
+        self._steps = 1 if period is None else steps_in("period", period, step_ns)
+        self.period_ns: Time = self._steps * step_ns
         periods = int(in_nanoseconds("stop", ENDLESS if stop is None else stop) // self.period_ns)
         stop_s = in_seconds(system.start_ns + periods * self.period_ns)
         self.session: Session = simulate.session(
@@ -106,8 +102,8 @@ class Model:
     def start(self, name: str, variable: Variable) -> Given:
         """What a parameter starts with."""
         component, _, _ = name.partition(".")
-        value = self.system.by_name[component].values.get(variable.name, variable.start_value)
-        return STARTS[variable.kind] if value is None else value  # type: ignore[return-value]
+        value: Given = self.system.by_name[component].values.get(variable.name, start_of(variable))
+        return value
 
     def set(self, name: str, value: Given, tunable: bool) -> None:
         """Set a parameter now, if the model has begun, and for each begin from now on.

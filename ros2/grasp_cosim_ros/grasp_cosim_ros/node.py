@@ -58,7 +58,7 @@ INTERNAL_ERROR, INPUT_ERROR, SIMULATION_ERROR = 1, 2, 3
 """Exit codes, as those of the command grasp-cosim."""
 
 
-class Told(NamedTuple):
+class Published(NamedTuple):
     """A topic that is published: its publisher, and what makes its messages."""
 
     topic: Topic
@@ -73,7 +73,7 @@ def _in_words(transition: Transition) -> Transition:
     """A transition that says why it fails: ROS does not."""
 
     @wraps(transition)
-    def told(node: FmuNode, state: Any) -> TransitionCallbackReturn:
+    def explained(node: FmuNode, state: Any) -> TransitionCallbackReturn:
         try:
             return transition(node, state)
         except (InputError, SimulationError) as error:
@@ -83,7 +83,7 @@ def _in_words(transition: Transition) -> Transition:
             node.fail(traceback.format_exc(), INTERNAL_ERROR)
             raise
 
-    return told
+    return explained
 
 
 class FmuNode(LifecycleNode):  # type: ignore[misc]
@@ -103,11 +103,11 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
         self._is_ticking = False
         self._is_simulated = False
         """True where the time is that of /clock."""
-        self._told: list[Told] = []
+        self._published: list[Published] = []
         self._heard: dict[str, Any] = {}
         """The subscriptions, by topic."""
         self._last_reason = ""
-        self._told_lines: set[str] = set()
+        self._logged_lines: set[str] = set()
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.create_timer(DIAGNOSTICS_INTERVAL, self._tell_status, clock=self._steady)
 
@@ -158,7 +158,7 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
         settings, model = self._settings, self._model
         if model is None:
             return FAILURE
-        self._told_lines.clear()
+        self._logged_lines.clear()
         self._last_reason = ""
         self._exchange = Exchange(model, self._topics, settings, self._publish, self._lost)
         self._heard.clear()
@@ -192,16 +192,16 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
         for topic in self._topics.publish:
             cls, encode = self._encoders[topic.name]
             publisher = self.create_publisher(cls, topic.name, _qos(topic))
-            self._told.append(Told(topic, publisher, encode))
+            self._published.append(Published(topic, publisher, encode))
         self._undo.append(self._close_publishers)
 
     def _close_publishers(self) -> None:
-        for told in self._told:
-            told.publisher.wait_for_all_acked(Duration(seconds=LAST_WORDS))
+        for published in self._published:
+            published.publisher.wait_for_all_acked(Duration(seconds=LAST_WORDS))
         sleep(LINGER)
-        for told in self._told:
-            self.destroy_publisher(told.publisher)
-        self._told.clear()
+        for published in self._published:
+            self.destroy_publisher(published.publisher)
+        self._published.clear()
 
     def _timer(self, period: float, callback: Callable[[], None]) -> Any:
         """A timer of the computer's clock that lives until deactivation."""
@@ -251,9 +251,9 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
         model = exchange.model
         if model.is_begun:
             values = exchange.failsafe()
-            for told in self._told:
-                if any(entry.name in self._topics.failsafe for entry in told.topic.entries):
-                    self._send(told, values)
+            for published in self._published:
+                if any(entry.name in self._topics.failsafe for entry in published.topic.entries):
+                    self._send(published, values)
         while self._undo:
             self._undo.pop()()
         if model.is_begun:
@@ -318,12 +318,12 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
             if not subscription.get_publisher_count()
         ]
         hears_all = not absent or not settings.in_lockstep
-        if not self._told and (hears_all or settings.initiate):
+        if not self._published and (hears_all or settings.initiate):
             self._open_publishers()
         absent += [
-            f"a subscriber of {told.topic.name}"
-            for told in self._told
-            if not told.publisher.get_subscription_count()
+            f"a subscriber of {published.topic.name}"
+            for published in self._published
+            if not published.publisher.get_subscription_count()
         ]
         if absent and settings.in_lockstep:
             line = f"waits for {', '.join(absent)}"
@@ -402,14 +402,15 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
     def _publish(self, values: Mapping[str, float]) -> None:
         if self._settings.publish_clock:
             self._clock_publisher.publish(Clock(clock=self._stamp()))
-        for told in self._told:
-            self._send(told, values)
+        for published in self._published:
+            self._send(published, values)
 
-    def _send(self, told: Told, values: Mapping[str, float]) -> None:
-        message = told.encode(values)
-        if hasattr(message, "header") and told.topic.type != JOINT_TRAJECTORY:  # it begins at once
+    def _send(self, published: Published, values: Mapping[str, float]) -> None:
+        message = published.encode(values)
+        begins_at_once = published.topic.type == JOINT_TRAJECTORY
+        if hasattr(message, "header") and not begins_at_once:
             message.header.stamp = self._stamp()
-        told.publisher.publish(message)
+        published.publisher.publish(message)
 
     def _stamp(self) -> Any:
         """The time of the model where it makes the time, else that of the node."""
@@ -454,9 +455,9 @@ class FmuNode(LifecycleNode):  # type: ignore[misc]
 
     def _is_new(self, line: str) -> bool:
         """True for a line that was not logged since the activation; of too many the rest is not."""
-        if line in self._told_lines or len(self._told_lines) >= MOST_LINES:
+        if line in self._logged_lines or len(self._logged_lines) >= MOST_LINES:
             return False
-        self._told_lines.add(line)
+        self._logged_lines.add(line)
         return True
 
     def _tell_error_once(self, line: str) -> None:

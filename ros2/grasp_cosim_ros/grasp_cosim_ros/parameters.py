@@ -57,7 +57,7 @@ class ModelParameters:
         node.add_on_set_parameters_callback(self._set)
         self._declared: list[str] = []
         for name, (variable, tunable) in self._known.items():
-            value = _as_told(variable, model.start(name, variable))
+            value = _in_ros(variable, model.start(name, variable))
             try:
                 node.declare_parameter(name, value, _descriptor(variable, tunable))
             except ParameterException as error:
@@ -89,10 +89,10 @@ class ModelParameters:
         """The value that the node has for a parameter, or before it is declared the model's."""
         if self._node.has_parameter(name):
             return self._node.get_parameter(name).value
-        return _as_told(variable, self._model.start(name, variable))
+        return _in_ros(variable, self._model.start(name, variable))
 
 
-def _as_told(variable: Variable, value: Given) -> Any:
+def _in_ros(variable: Variable, value: Given) -> Any:
     """A value as ROS has it: of an enumeration the name of the item."""
     names = {number: name for name, number in variable.items.items()}
     return names.get(value, value) if isinstance(value, int) else value
