@@ -3,6 +3,7 @@
 import pytest
 from grasp_cosim import InputError, grasp_system, simulate
 from grasp_cosim_ros.model import Model, single_fmu
+from support.native_fmus import state_space
 
 
 @pytest.fixture
@@ -17,6 +18,12 @@ def test_all_inputs_of_a_single_fmu_are_free(controller):
     assert controller.advance({"fmu.position[1]": 0.2, "fmu.intensity[2]": 1.0})
     assert controller.read(["fmu.position[1]"]) == {"fmu.position[1]": 0.2}
     assert controller.time_ns == 1_000_000
+
+
+def test_elements_of_arrays_are_free_inputs_too(tmp_path):
+    state_space(tmp_path, types=False, binary=False)
+    system = single_fmu(tmp_path / "ss.fmu", 1e-3)
+    assert {"u[1]", "u[2]", "u[3]"} <= system.by_name["fmu"].values.keys()
 
 
 def test_each_begin_starts_from_the_values_that_were_set(controller):

@@ -6,11 +6,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from grasp_cosim import InputError, System, simulate
-from grasp_cosim.interface.read import describe
 from grasp_cosim.interface.values import Given
 from grasp_cosim.interface.variables import Variable
 from grasp_cosim.master.session import Session
-from grasp_cosim.system.parts import Port
+from grasp_cosim.system.parts import Component, Port
 from grasp_cosim.system.scenario import settable_ports
 from grasp_cosim.system.times import Time, in_nanoseconds, in_seconds, steps_in
 from grasp_cosim.system.without import start_of
@@ -37,7 +36,7 @@ def single_fmu(path: Path, step: float) -> System:
     Raises:
         InputError: The FMU cannot be read, or does not run here.
     """
-    inputs = [v for v in describe(path).of("input") if v.supported]
+    inputs = [v for v in Component(COMPONENT, path, {}).interface.of("input") if v.supported]
     values = {variable.name: start_of(variable) for variable in inputs}
     return System(
         path.stem,
